@@ -1,0 +1,29 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+
+namespace photoslam {
+
+/// Wall-clock stopwatch.
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+  double milliseconds() const { return seconds() * 1e3; }
+  void restart() { start_ = std::chrono::steady_clock::now(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// CPU time used so far by the calling thread [s].
+double thread_cpu_seconds();
+/// CPU time used so far by the whole process [s].
+double process_cpu_seconds();
+/// Largest resident set so far [MB, 1e6 bytes].
+double peak_rss_mb();
+/// Lowers the calling thread's scheduling priority for good (nice 10); without effect where not supported.
+void lower_thread_priority();
+
+}  // namespace photoslam

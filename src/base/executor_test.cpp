@@ -1,0 +1,53 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "base/executor.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <stdexcept>
+
+namespace photoslam {
+namespace {
+
+TEST(ThreadPool, RunsEveryTaskExactlyOnce) {
+  ThreadPool pool(3);
+  for (int count : {0, 1, 2, 7, 1000}) {
+    std::vector<std::atomic<int>> runs(static_cast<size_t>(count));
+    pool.for_each(count, [&](int i, int worker) {
+      EXPECT_GE(worker, 0);
+      EXPECT_LT(worker, pool.concurrency());
+      ++runs[static_cast<size_t>(i)];
+    });
+    for (const auto& r : runs) EXPECT_EQ(r, 1);
+  }
+}
+
+TEST(ThreadPool, SurvivesManySmallBatches) {
+  ThreadPool pool(4);
+  std::atomic<long> sum = 0;
+  for (int batch = 0; batch < 2000; ++batch) pool.for_each(5, [&](int i, int) { sum += i; });
+  EXPECT_EQ(sum, 2000 * 10);
+}
+
+TEST(ThreadPool, RethrowsTheTaskFailureAfterAllTasksRan) {
+  ThreadPool pool(2);
+  std::atomic<int> ran = 0;
+  EXPECT_THROW(pool.for_each(10,
+                             [&](int i, int) {
+                               ++ran;
+                               if (i == 3) throw std::runtime_error("task 3");
+                             }),
+               std::runtime_error);
+  EXPECT_EQ(ran, 10);
+}
+
+TEST(SerialExecutor, KeepsOrder) {
+  SerialExecutor serial;
+  std::vector<int> order;
+  serial.for_each(4, [&](int i, int) { order.push_back(i); });
+  EXPECT_EQ(order, (std::vector{0, 1, 2, 3}));
+}
+
+}  // namespace
+}  // namespace photoslam

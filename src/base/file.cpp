@@ -1,0 +1,76 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "base/file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+namespace photoslam {
+namespace {
+
+Error system_error(std::string_view doing, const std::filesystem::path& path) {
+  return error("cannot {} {}: {}", doing, path.string(), std::strerror(errno));
+}
+
+Status write_all(int descriptor, std::span<const std::byte> content, const std::filesystem::path& path) {
+  while (!content.empty()) {
+    const ssize_t written = ::write(descriptor, content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return system_error("write", path);
+    content = content.subspan(static_cast<size_t>(written));
+  }
+  return {};
+}
+
+}  // namespace
+
+Status write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> content) {
+  std::filesystem::path temporary = path;
+  temporary += fmt::format(".{}.tmp", ::getpid());
+  const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (descriptor < 0) return system_error("create", temporary);
+
+  Status status = write_all(descriptor, content, temporary);
+  if (status && ::fsync(descriptor) != 0) status = system_error("flush", temporary);
+  if (::close(descriptor) != 0 && status) status = system_error("close", temporary);
+  if (status && ::rename(temporary.c_str(), path.c_str()) != 0) status = system_error("replace", path);
+  if (!status) ::unlink(temporary.c_str());
+  return status;
+}
+
+Status write_file_atomically(const std::filesystem::path& path, std::string_view content) {
+  return write_file_atomically(path, std::as_bytes(std::span(content)));
+}
+
+Result<std::string> read_file(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) return error("{} is a folder, expected a file", path.string());
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) return system_error("open", path);
+  std::ostringstream content;
+  content << stream.rdbuf();
+  if (stream.bad()) return system_error("read", path);
+  return std::move(content).str();
+}
+
+Status prepare_output_folder(const std::filesystem::path& folder) {
+  std::error_code code;
+  std::filesystem::create_directories(folder, code);
+  if (code) return error("cannot create the output folder {}: {}", folder.string(), code.message());
+  const std::filesystem::path probe = folder / fmt::format(".write-test.{}", ::getpid());
+  const int descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+  if (descriptor < 0) {
+    return error("cannot write into the output folder {}: {}; choose another with --output", folder.string(),
+                 std::strerror(errno));
+  }
+  ::close(descriptor);
+  ::unlink(probe.c_str());
+  return {};
+}
+
+}  // namespace photoslam

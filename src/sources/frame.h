@@ -1,0 +1,60 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/ids.h"
+#include "base/result.h"
+#include "camera/pinhole.h"
+#include "image/image.h"
+
+namespace photoslam {
+
+enum class SensorKind { mono, stereo, rgbd };
+
+/// One input frame as delivered by a source.
+struct Frame {
+  FrameId id;
+  int64_t timestamp_ns = 0;
+  ImageU8 color;  ///< RGB, or grey with one channel.
+  ImageU16 depth; ///< RGB-D only, registered to the colour image; metres = value * SourceInfo::metres_per_depth_unit.
+  /// Empty when the frame is usable; otherwise why not (unreadable file, wrong size, …). Such frames are counted as
+  /// lost and skipped, never fatal; their images may be empty.
+  std::string defect;
+};
+
+/// Radial-tangential distortion (k1, k2, p1, p2, k3) as in OpenCV; all zero means none.
+struct Distortion {
+  double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
+  bool none() const { return k1 == 0 && k2 == 0 && p1 == 0 && p2 == 0 && k3 == 0; }
+};
+
+/// What a source knows before its first frame.
+struct SourceInfo {
+  std::string name;        ///< For people: format and folder.
+  std::string format;      ///< "tum", "replica", …
+  SensorKind sensor = SensorKind::rgbd;
+  PinholeCamera camera;    ///< Raw intrinsics; with a distortion, those of the distorted image.
+  Distortion distortion;
+  double metres_per_depth_unit = 0.0;
+  double frames_per_second = 0.0;  ///< Nominal.
+  int num_frames = 0;              ///< 0 when not known in advance.
+  std::vector<std::string> notes;  ///< Things guessed or missing that the user should know.
+};
+
+/// A sequence of frames in time order. Not thread-safe; ground truth is not reachable through it.
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+  virtual const SourceInfo& info() const = 0;
+  /// The next frame, or nothing at the end. Timestamps increase strictly.
+  virtual std::optional<Frame> next() = 0;
+};
+
+}  // namespace photoslam
