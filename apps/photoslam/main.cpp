@@ -1,0 +1,9 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "commands.h"
+
+int main(int argc, char** argv) {
+  photoslam::CommandLine line;
+  photoslam::add_doctor(line);
+  return line.run(argc, argv);
+}
