@@ -11,6 +11,7 @@
 
 #include "base/ids.h"
 #include "base/result.h"
+#include "camera/distortion.h"
 #include "camera/pinhole.h"
 #include "image/image.h"
 
@@ -22,25 +23,19 @@ enum class SensorKind { mono, stereo, rgbd };
 struct Frame {
   FrameId id;
   int64_t timestamp_ns = 0;
-  ImageU8 color;  ///< RGB, or grey with one channel.
-  ImageU16 depth; ///< RGB-D only, registered to the colour image; metres = value * SourceInfo::metres_per_depth_unit.
+  ImageU8 color;   ///< RGB, or grey with one channel.
+  ImageU16 depth;  ///< RGB-D only, registered to the colour image; metres = value * SourceInfo::metres_per_depth_unit.
   /// Empty when the frame is usable; otherwise why not (unreadable file, wrong size, …). Such frames are counted as
   /// lost and skipped, never fatal; their images may be empty.
   std::string defect;
 };
 
-/// Radial-tangential distortion (k1, k2, p1, p2, k3) as in OpenCV; all zero means none.
-struct Distortion {
-  double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
-  bool none() const { return k1 == 0 && k2 == 0 && p1 == 0 && p2 == 0 && k3 == 0; }
-};
-
 /// What a source knows before its first frame.
 struct SourceInfo {
-  std::string name;        ///< For people: format and folder.
-  std::string format;      ///< "tum", "replica", …
+  std::string name;    ///< For people: format and folder.
+  std::string format;  ///< "tum", "replica", …
   SensorKind sensor = SensorKind::rgbd;
-  PinholeCamera camera;    ///< Raw intrinsics; with a distortion, those of the distorted image.
+  PinholeCamera camera;  ///< Raw intrinsics; with a distortion, those of the distorted image.
   Distortion distortion;
   double metres_per_depth_unit = 0.0;
   double frames_per_second = 0.0;  ///< Nominal.

@@ -1,0 +1,43 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "base/ids.h"
+#include "image/image.h"
+
+namespace photoslam {
+
+/// How well a render shows one frame.
+struct FrameScore {
+  FrameId frame;
+  int64_t timestamp_ns = 0;
+  double psnr_db = 0;
+  double ssim = 0;
+};
+
+/// Figures over a set of frames.
+struct ImageFigures {
+  std::optional<double> psnr_db;     ///< Mean of the frames' PSNR.
+  std::optional<double> psnr_p5_db;  ///< 5th percentile over frames.
+  std::optional<double> ssim;        ///< Mean.
+  std::optional<double> lpips;
+  std::optional<int64_t> frames;
+};
+
+/// Scores a render (values in [0, 1], clamped) against the picture of the frame. Pixels where `mask` (empty = none) is
+/// 0 do not count.
+FrameScore score_frame(FrameId frame, int64_t timestamp_ns, const ImageF& render, const ImageU8& truth,
+                       const ImageU8& mask = {});
+
+/// All unset when there are no scores.
+ImageFigures summarize(const std::vector<FrameScore>& scores);
+
+/// Value below which the share `p` in [0, 1] of the values lies, interpolated linearly; the values may be unsorted and
+/// must not be empty.
+double percentile(std::vector<double> values, double p);
+
+}  // namespace photoslam

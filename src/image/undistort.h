@@ -1,0 +1,36 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "camera/distortion.h"
+#include "camera/pinhole.h"
+#include "image/image.h"
+
+namespace photoslam {
+
+/// Resamples images of a lens with distortion to what a pinhole camera with the same intrinsics sees.
+class Undistorter {
+ public:
+  /// `camera` holds the intrinsics of the distorted image; it is also the camera of the result.
+  Undistorter(const PinholeCamera& camera, const Distortion& distortion);
+
+  const PinholeCamera& camera() const { return camera_; }
+
+  /// 255 where the result has data, 0 where the lens did not see.
+  const ImageU8& mask() const { return mask_; }
+
+  /// Bilinear; black where there is no data. The image has the camera's size, any number of channels.
+  ImageU8 color(const ImageU8& distorted) const;
+
+  /// Nearest neighbour, because depths of two surfaces must not be mixed; 0 where there is no data.
+  ImageU16 depth(const ImageU16& distorted) const;
+
+ private:
+  PinholeCamera camera_;
+  ImageU8 mask_;
+  std::vector<float> source_;  // [H, W, 2] position in the distorted image
+};
+
+}  // namespace photoslam

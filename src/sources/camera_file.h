@@ -1,0 +1,28 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "base/result.h"
+#include "camera/distortion.h"
+#include "camera/pinhole.h"
+
+namespace photoslam {
+
+/// Calibration of a camera as its file gives it.
+struct CameraFile {
+  PinholeCamera camera;
+  Distortion distortion;
+  std::optional<double> frames_per_second;
+  std::optional<double> depth_scale;  ///< Stored depth value / depth_scale = metres.
+};
+
+/// Reads `camera.yaml`: model (pinhole), width, height, fx, fy, cx, cy [px], and optionally distortion (a list of
+/// 4 or 5 coefficients k1, k2, p1, p2, k3, or empty), fps, depth_scale.
+///
+/// Missing, unknown (with the nearest known one) and senseless values are errors with file and line.
+Result<CameraFile> read_camera_yaml(const std::filesystem::path& path);
+
+}  // namespace photoslam
