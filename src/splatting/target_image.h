@@ -1,0 +1,48 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace photoslam::splatting {
+
+/// What a view should look like: 8-bit colours, optionally a mask and metric depth, kept compactly.
+class TargetImage {
+ public:
+  TargetImage() = default;
+  /// `rgb` is interleaved [H, W, 3]. `mask`, when not empty, is [H, W]: 0 = no data, the pixel does not count.
+  TargetImage(int width, int height, std::span<const uint8_t> rgb, std::span<const uint8_t> mask = {});
+
+  /// Depth [H, W] in units of `unit` metres; 0 = not measured.
+  void set_depth(std::span<const uint16_t> depth, float unit);
+  /// Depth [H, W] in metres; not finite or <= 0 = not measured. Stored in 16 bits, steps of max/65535.
+  void set_depth(std::span<const float> depth);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  bool empty() const { return rgb_.empty(); }
+  bool has_mask() const { return !mask_.empty(); }
+  bool has_depth() const { return !depth_.empty(); }
+
+  std::span<const uint8_t> rgb() const { return rgb_; }       // [H, W, 3]
+  std::span<const uint8_t> mask() const { return mask_; }     // [H, W] or empty
+  std::span<const uint16_t> depth() const { return depth_; }  // [H, W] or empty
+  float depth_unit() const { return depth_unit_; }
+
+  /// Number of pixels with data, and of those with depth.
+  int num_valid() const { return num_valid_; }
+  int num_depth() const { return num_depth_; }
+
+ private:
+  int width_ = 0, height_ = 0;
+  std::vector<uint8_t> rgb_;
+  std::vector<uint8_t> mask_;
+  std::vector<uint16_t> depth_;
+  float depth_unit_ = 0;
+  int num_valid_ = 0;
+  int num_depth_ = 0;
+};
+
+}  // namespace photoslam::splatting
