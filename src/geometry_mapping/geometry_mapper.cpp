@@ -1,0 +1,229 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "geometry_mapping/geometry_mapper.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+namespace photoslam {
+namespace {
+
+constexpr int kMinCovisible = 15;
+constexpr int kTrialKeyframes = 3;  // a young landmark must prove itself over this many keyframes
+
+}  // namespace
+
+void GeometryMapperOptions::visit(OptionVisitor& v) {
+  v.value({"local_keyframes", "", 2, 200, "Keyframes refined by local bundle adjustment, Eq. (2)."}, local_keyframes);
+  v.value({"fixed_keyframes", "", 1, 500, "Further observers of the same landmarks held fixed."}, fixed_keyframes);
+  v.value({"fusion_keyframes", "", 0, 100, "Covisible keyframes searched for duplicate landmarks."}, fusion_keyframes);
+  v.value({"fusion_radius_px", "px", 0.5, 50.0, "Search radius for duplicates."}, fusion_radius_px);
+  v.value(
+      {"min_found_ratio", "", 0.0, 1.0, "Young landmarks matched in fewer of the frames that see them are removed."},
+      min_found_ratio);
+  v.value({"max_landmark_depth_m", "m", 0.1, 1000.0, "Farther depth measurements do not make landmarks."},
+          max_landmark_depth_m);
+  v.group("bundle", "The local bundle adjustment.", bundle);
+}
+
+GeometryMapper::GeometryMapper(const GeometryMapperOptions& options, const OrbOptions& orb, const PinholeCamera& camera,
+                               double bf)
+    : options_(options),
+      camera_(camera),
+      bf_(bf),
+      map_(orb.scale_factor, orb.num_levels),
+      projector_(orb, camera, bf) {}
+
+GeometryUpdate GeometryMapper::process(const KeyframeProposal& proposal, const std::function<bool()>& interrupted) {
+  GeometryUpdate update;
+  update.keyframe = proposal.id;
+  insert(proposal);
+  update.culled_landmarks = cull_recent_landmarks(proposal.id);
+  update.new_landmarks = create_landmarks(proposal.id);
+  update.fused_landmarks = fuse_with_neighbours(proposal.id);
+  update.moved_keyframes.push_back(proposal.id);
+  update.bundle = adjust_locally(proposal.id, interrupted, update.moved_keyframes);
+  update.map = map_.snapshot();
+  return update;
+}
+
+void GeometryMapper::insert(const KeyframeProposal& proposal) {
+  // The pose was estimated in an older map: it follows its reference keyframe into this one.
+  const SE3 camera_from_world =
+      proposal.reference.valid() ? proposal.camera_from_reference * map_.keyframe(proposal.reference).camera_from_world
+                                 : proposal.camera_from_reference;
+  map_.add_keyframe(proposal.id, proposal.frame, camera_from_world);
+  map_.set_parent(proposal.id, proposal.reference);
+  for (const auto& [id, sighting] : proposal.sightings) map_.count_sightings(id, sighting.visible, sighting.found);
+  for (size_t i = 0; i < proposal.landmarks.size(); ++i) {
+    LandmarkId id = proposal.landmarks[i];
+    while (id.valid() && !map_.landmark(id).view.alive) id = map_.landmark(id).view.replaced_by;
+    if (id.valid() && map_.add_observation(id, proposal.id, static_cast<int>(i))) map_.update_view(id);
+  }
+}
+
+int GeometryMapper::cull_recent_landmarks(KeyframeId current) {
+  int culled = 0;
+  std::erase_if(recent_landmarks_, [&](LandmarkId id) {
+    const Landmark& landmark = map_.landmark(id);
+    if (!landmark.view.alive) return true;
+    const int age = current.value - landmark.created_by.value;
+    const bool rarely_found = landmark.times_found < options_.min_found_ratio * landmark.times_visible;
+    const bool never_seen_again = age >= kTrialKeyframes && landmark.observations.size() < 2;
+    if (rarely_found || never_seen_again) {
+      map_.erase_landmark(id);
+      ++culled;
+      return true;
+    }
+    return age >= kTrialKeyframes;
+  });
+  return culled;
+}
+
+int GeometryMapper::create_landmarks(KeyframeId id) {
+  const Keyframe& keyframe = map_.keyframe(id);
+  const SE3 world_from_camera = keyframe.camera_from_world.inverse();
+  int created = 0;
+  for (size_t i = 0; i < keyframe.frame->size(); ++i) {
+    const auto depth = static_cast<double>(keyframe.frame->depth[i]);
+    if (keyframe.landmarks[i].valid() || !(depth > 0) || depth > options_.max_landmark_depth_m) continue;
+    const Vec3 point = world_from_camera * camera_.unproject(keyframe.frame->observations[i].pixel, depth);
+    recent_landmarks_.push_back(map_.add_landmark(point, id, static_cast<int>(i)));
+    ++created;
+  }
+  return created;
+}
+
+int GeometryMapper::fuse_with_neighbours(KeyframeId id) {
+  auto neighbours = map_.covisible_keyframes(id, kMinCovisible);
+  neighbours.resize(std::min(neighbours.size(), static_cast<size_t>(options_.fusion_keyframes)));
+  int fused = 0;
+  std::set<LandmarkId> of_neighbours;
+  for (const auto& neighbour : neighbours) {
+    const std::vector<LandmarkId> own = map_.keyframe(id).landmarks;
+    fused += fuse_into(neighbour.keyframe, own);
+    for (const LandmarkId landmark : map_.keyframe(neighbour.keyframe).landmarks) {
+      if (landmark.valid()) of_neighbours.insert(landmark);
+    }
+  }
+  return fused + fuse_into(id, std::vector<LandmarkId>(of_neighbours.begin(), of_neighbours.end()));
+}
+
+int GeometryMapper::fuse_into(KeyframeId target_id, std::span<const LandmarkId> landmarks) {
+  const Keyframe& target = map_.keyframe(target_id);
+  projector_.clear();
+  const std::set<LandmarkId> already(target.landmarks.begin(), target.landmarks.end());
+  for (const LandmarkId id : landmarks) {
+    if (!id.valid() || already.contains(id) || !map_.landmark(id).view.alive) continue;
+    projector_.add(target.camera_from_world, id, map_.landmark(id).view, static_cast<float>(options_.fusion_radius_px));
+  }
+  MatchOptions match_options;
+  match_options.max_distance = 50;
+  match_options.check_rotation = false;
+  std::vector<int> keypoint_of_query;
+  matcher_.match(match_options, {target.frame->features, target.frame->grid, {}, {}}, projector_.queries(),
+                 keypoint_of_query);
+  int fused = 0;
+  for (size_t query = 0; query < keypoint_of_query.size(); ++query) {
+    if (keypoint_of_query[query] == kNoMatch) continue;
+    const LandmarkId id = projector_.landmark(query).id;
+    const auto keypoint = static_cast<size_t>(keypoint_of_query[query]);
+    const bool fits = reprojection_chi2(camera_, bf_, target.camera_from_world, map_.landmark(id).view.position,
+                                        target.frame->observations[keypoint]) < 7.815;
+    if (!fits || !map_.landmark(id).view.alive) continue;
+    const LandmarkId present = target.landmarks[keypoint];
+    if (!present.valid()) {
+      if (map_.add_observation(id, target_id, static_cast<int>(keypoint))) map_.update_view(id);
+    } else if (present != id) {
+      const bool keep_present = map_.landmark(present).observations.size() >= map_.landmark(id).observations.size();
+      map_.fuse(keep_present ? id : present, keep_present ? present : id);
+    }
+    ++fused;
+  }
+  return fused;
+}
+
+void GeometryMapper::build_local_problem(KeyframeId id) {
+  problem_.clear();
+  problem_keyframes_.assign(1, id);
+  for (const auto& neighbour : map_.covisible_keyframes(id, kMinCovisible)) {
+    if (static_cast<int>(problem_keyframes_.size()) >= options_.local_keyframes) break;
+    problem_keyframes_.push_back(neighbour.keyframe);
+  }
+  std::set<LandmarkId> landmarks;
+  for (const KeyframeId keyframe : problem_keyframes_) {
+    for (const LandmarkId landmark : map_.keyframe(keyframe).landmarks) {
+      if (landmark.valid()) landmarks.insert(landmark);
+    }
+  }
+  const size_t num_free = problem_keyframes_.size();
+  std::map<KeyframeId, int> outer;  // observers outside the window, by number of shared landmarks
+  for (const LandmarkId landmark : landmarks) {
+    for (const auto& o : map_.landmark(landmark).observations) {
+      if (std::ranges::find(problem_keyframes_, o.keyframe) == problem_keyframes_.end()) ++outer[o.keyframe];
+    }
+  }
+  std::vector<std::pair<int, KeyframeId>> ring;
+  for (const auto& [keyframe, count] : outer) ring.emplace_back(-count, keyframe);
+  std::ranges::sort(ring);
+  ring.resize(std::min(ring.size(), static_cast<size_t>(options_.fixed_keyframes)));
+  for (const auto& entry : ring) problem_keyframes_.push_back(entry.second);
+
+  std::map<KeyframeId, int> pose_index;
+  for (const KeyframeId keyframe : problem_keyframes_) {
+    const int index = static_cast<int>(problem_.camera_from_world.size());
+    pose_index[keyframe] = index;
+    problem_.camera_from_world.push_back(map_.keyframe(keyframe).camera_from_world);
+    // The first keyframe defines the world.
+    const bool fixed = static_cast<size_t>(index) >= num_free || keyframe.value == 0;
+    problem_.pose_is_fixed.push_back(fixed ? 1 : 0);
+  }
+  if (std::ranges::count(problem_.pose_is_fixed, 1) == 0) {  // no outer ring: the oldest keyframe holds the window
+    problem_.pose_is_fixed[static_cast<size_t>(pose_index.begin()->second)] = 1;
+  }
+  problem_landmarks_.clear();
+  for (const LandmarkId landmark : landmarks) {
+    const int point = static_cast<int>(problem_.points_in_world.size());
+    problem_landmarks_.push_back(landmark);
+    problem_.points_in_world.push_back(map_.landmark(landmark).view.position);
+    for (const auto& [keyframe, keypoint] : map_.landmark(landmark).observations) {
+      const auto pose = pose_index.find(keyframe);
+      if (pose == pose_index.end()) continue;
+      problem_.observations.push_back(
+          {pose->second, point, map_.keyframe(keyframe).frame->observations[static_cast<size_t>(keypoint)]});
+    }
+  }
+}
+
+BundleSummary GeometryMapper::adjust_locally(KeyframeId id, const std::function<bool()>& interrupted,
+                                             std::vector<KeyframeId>& moved) {
+  if (map_.num_keyframes() < 2) return {};
+  build_local_problem(id);
+  const BundleSummary summary = adjuster_.solve(options_.bundle, camera_, bf_, problem_, interrupted);
+  for (size_t i = 0; i < problem_keyframes_.size(); ++i) {
+    if (problem_.pose_is_fixed[i]) continue;
+    map_.set_pose(problem_keyframes_[i], problem_.camera_from_world[i]);
+    if (problem_keyframes_[i] != id) moved.push_back(problem_keyframes_[i]);
+  }
+  for (size_t i = 0; i < problem_landmarks_.size(); ++i) {
+    map_.set_position(problem_landmarks_[i], problem_.points_in_world[i]);
+  }
+  remove_outliers();
+  for (const LandmarkId landmark : problem_landmarks_) map_.update_view(landmark);
+  return summary;
+}
+
+void GeometryMapper::remove_outliers() {
+  for (const auto& [pose, point, observation] : problem_.observations) {
+    const double limit = observation.has_depth() ? 7.815 : 5.991;
+    const double chi2 = reprojection_chi2(camera_, bf_, problem_.camera_from_world[static_cast<size_t>(pose)],
+                                          problem_.points_in_world[static_cast<size_t>(point)], observation);
+    if (chi2 > limit) {
+      map_.remove_observation(problem_landmarks_[static_cast<size_t>(point)],
+                              problem_keyframes_[static_cast<size_t>(pose)]);
+    }
+  }
+}
+
+}  // namespace photoslam

@@ -1,0 +1,75 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "base/options.h"
+#include "localization/landmark_projection.h"
+#include "localization/tracker.h"
+#include "map/map.h"
+#include "optimization/bundle_adjustment.h"
+
+namespace photoslam {
+
+struct GeometryMapperOptions {
+  int local_keyframes = 12;
+  int fixed_keyframes = 12;
+  int fusion_keyframes = 8;
+  double fusion_radius_px = 3.0;
+  double min_found_ratio = 0.25;
+  double max_landmark_depth_m = 6.0;
+  BundleOptions bundle;
+  void visit(OptionVisitor& visitor);
+};
+
+/// What changed in the map while one keyframe was processed.
+struct GeometryUpdate {
+  KeyframeId keyframe;  ///< The one that was added.
+  std::shared_ptr<const MapSnapshot> map;
+  std::vector<KeyframeId> moved_keyframes;  ///< Poses that differ from the snapshot before, the new one included.
+  BundleSummary bundle;
+  int new_landmarks = 0, fused_landmarks = 0, culled_landmarks = 0;
+};
+
+/// Geometry mapping: grows the map by keyframes and landmarks and keeps it consistent by local bundle adjustment over
+/// covisible keyframes (paper, Sec. 3.2, Eq. 2). Synchronous and deterministic; owns the map.
+class GeometryMapper {
+ public:
+  GeometryMapper(const GeometryMapperOptions& options, const OrbOptions& orb, const PinholeCamera& camera, double bf);
+
+  /// Adds the keyframe, culls and creates landmarks, fuses duplicates, adjusts, publishes. `interrupted` (asked between
+  /// iterations) ends the adjustment early.
+  GeometryUpdate process(const KeyframeProposal& proposal, const std::function<bool()>& interrupted = {});
+
+  const Map& map() const { return map_; }
+
+ private:
+  void insert(const KeyframeProposal& proposal);
+  int cull_recent_landmarks(KeyframeId current);
+  int create_landmarks(KeyframeId id);
+  int fuse_with_neighbours(KeyframeId id);
+  int fuse_into(KeyframeId target, std::span<const LandmarkId> landmarks);
+  BundleSummary adjust_locally(KeyframeId id, const std::function<bool()>& interrupted, std::vector<KeyframeId>& moved);
+  void build_local_problem(KeyframeId id);
+  void remove_outliers();
+
+  GeometryMapperOptions options_;
+  PinholeCamera camera_;
+  double bf_;
+  Map map_;
+  LandmarkProjector projector_;
+  ProjectionMatcher matcher_;
+  BundleAdjuster adjuster_;
+  std::vector<LandmarkId> recent_landmarks_;
+
+  // The local problem and what its indices stand for.
+  BundleProblem problem_;
+  std::vector<KeyframeId> problem_keyframes_;
+  std::vector<LandmarkId> problem_landmarks_;
+};
+
+}  // namespace photoslam

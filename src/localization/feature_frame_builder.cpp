@@ -1,0 +1,63 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "localization/feature_frame_builder.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace photoslam {
+
+void DepthOptions::visit(OptionVisitor& v) {
+  v.value({"virtual_baseline_m", "m", 0.01, 1.0, "Turns depth into a disparity; larger trusts depth more."},
+          virtual_baseline_m);
+  v.value({"min_m", "m", 0.0, 10.0, "Depth below this counts as missing."}, min_m);
+  v.value({"max_m", "m", 0.5, 1000.0, "Depth above this counts as missing."}, max_m);
+  v.value({"max_edge_ratio", "", 0.0, 1.0, "Relative depth step in a 3x3 patch above which a keypoint has no depth."},
+          max_edge_ratio);
+}
+
+FeatureFrameBuilder::FeatureFrameBuilder(const OrbOptions& orb, const DepthOptions& depth, const PinholeCamera& camera,
+                                         double metres_per_depth_unit)
+    : orb_options_(orb),
+      depth_options_(depth),
+      camera_(camera),
+      metres_per_depth_unit_(metres_per_depth_unit),
+      extractor_(orb) {}
+
+float FeatureFrameBuilder::depth_at(const ImageU16& depth, const Keypoint& keypoint) const {
+  const int x = static_cast<int>(std::lround(keypoint.x));
+  const int y = static_cast<int>(std::lround(keypoint.y));
+  if (x < 1 || y < 1 || x >= depth.width() - 1 || y >= depth.height() - 1) return 0.0f;
+  const double centre = depth(x, y) * metres_per_depth_unit_;
+  if (centre < depth_options_.min_m || centre > depth_options_.max_m) return 0.0f;
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      const double neighbour = depth(x + dx, y + dy) * metres_per_depth_unit_;
+      if (std::abs(neighbour - centre) > depth_options_.max_edge_ratio * centre) return 0.0f;
+    }
+  }
+  return static_cast<float>(centre);
+}
+
+std::shared_ptr<const FeatureFrame> FeatureFrameBuilder::build(FrameId id, int64_t timestamp_ns, const ImageU8& grey,
+                                                               const ImageU16& depth) {
+  auto frame = std::make_shared<FeatureFrame>();
+  frame->frame = id;
+  frame->timestamp_ns = timestamp_ns;
+  extractor_.extract(grey, frame->features);
+  const size_t n = frame->size();
+  frame->depth.resize(n, 0.0f);
+  frame->observations.resize(n);
+  for (size_t i = 0; i < n; ++i) {
+    const Keypoint& keypoint = frame->features.keypoints[i];
+    PixelObservation& observation = frame->observations[i];
+    observation.pixel = {keypoint.x, keypoint.y};
+    observation.inverse_variance = std::pow(orb_options_.scale_factor, -2 * keypoint.octave);
+    if (!depth.empty()) frame->depth[i] = depth_at(depth, keypoint);
+    if (frame->depth[i] > 0) observation.u_right = keypoint.x - bf() / static_cast<double>(frame->depth[i]);
+  }
+  frame->grid.build(frame->features.keypoints, grey.width(), grey.height());
+  return frame;
+}
+
+}  // namespace photoslam

@@ -1,0 +1,50 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "camera/pinhole.h"
+#include "features/matching.h"
+#include "map/snapshot.h"
+
+namespace photoslam {
+
+/// A landmark that should be visible, and where to look for it.
+struct ProjectedLandmark {
+  LandmarkId id;
+  Vec3 position = Vec3::Zero();
+};
+
+/// Projects landmarks into a camera and says where and on which pyramid level to look for them.
+class LandmarkProjector {
+ public:
+  LandmarkProjector(const OrbOptions& orb, const PinholeCamera& camera, double bf);
+
+  /// Appends the landmark unless it lies outside the image, beyond the range of its descriptor or is seen from the back
+  /// (more than 60° off its mean viewing direction). The radius [px] is multiplied by the scale of the predicted level.
+  void add(const SE3& camera_from_world, LandmarkId id, const LandmarkView& view, float radius_px);
+
+  /// Appends a bare point last seen at `keypoint`: the search covers its octave and both neighbours.
+  void add(const SE3& camera_from_world, LandmarkId id, const Vec3& position, const Keypoint& keypoint,
+           const Descriptor& descriptor, float radius_px);
+
+  void clear();
+  std::span<const ProjectionQuery> queries() const { return queries_; }
+  const ProjectedLandmark& landmark(size_t query) const { return landmarks_[query]; }
+  size_t size() const { return queries_.size(); }
+
+ private:
+  bool project(const SE3& camera_from_world, const Vec3& position, ProjectionQuery& query) const;
+
+  double log_scale_factor_;
+  int num_levels_;
+  std::vector<float> level_scale_;
+  PinholeCamera camera_;
+  double bf_;
+  std::vector<ProjectionQuery> queries_;
+  std::vector<ProjectedLandmark> landmarks_;
+};
+
+}  // namespace photoslam

@@ -1,0 +1,194 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "map/map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "base/check.h"
+
+namespace photoslam {
+namespace {
+
+constexpr int kMinCovisibleLandmarks = 15;
+
+/// The descriptor with the smallest median distance to the others.
+Descriptor most_central(const std::vector<const Descriptor*>& descriptors) {
+  size_t best = 0;
+  int best_median = 257;
+  std::vector<int> distances(descriptors.size());
+  for (size_t i = 0; i < descriptors.size(); ++i) {
+    for (size_t j = 0; j < descriptors.size(); ++j) distances[j] = hamming_distance(*descriptors[i], *descriptors[j]);
+    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>((distances.size() - 1) / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    if (*middle < best_median) {
+      best_median = *middle;
+      best = i;
+    }
+  }
+  return *descriptors[best];
+}
+
+double median_landmark_depth(const Map& map, const Keyframe& keyframe) {
+  std::vector<double> depths;
+  for (const LandmarkId id : keyframe.landmarks) {
+    if (id.valid()) depths.push_back((keyframe.camera_from_world * map.landmark(id).view.position).z());
+  }
+  if (depths.empty()) return 0;
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle;
+}
+
+}  // namespace
+
+Map::Map(double scale_factor, int num_levels) : scale_factor_(scale_factor), num_levels_(num_levels) {}
+
+Keyframe& Map::mutable_keyframe(KeyframeId id) {
+  PHOTOSLAM_CHECK(id.valid() && static_cast<size_t>(id.value) < keyframes_.size(), "keyframe {}", id.value);
+  changed_keyframes_.insert(id);
+  return keyframes_[static_cast<size_t>(id.value)];
+}
+
+Landmark& Map::mutable_landmark(LandmarkId id) {
+  PHOTOSLAM_CHECK(id.valid() && static_cast<size_t>(id.value) < landmarks_.size(), "landmark {}", id.value);
+  changed_chunks_.insert(id.value / MapSnapshot::kChunk);
+  return landmarks_[static_cast<size_t>(id.value)];
+}
+
+Keyframe& Map::add_keyframe(KeyframeId id, std::shared_ptr<const FeatureFrame> frame, const SE3& camera_from_world) {
+  PHOTOSLAM_CHECK(static_cast<size_t>(id.value) == keyframes_.size(), "keyframe {} after {}", id.value,
+                  keyframes_.size());
+  std::vector<LandmarkId> none(frame->size());
+  keyframes_.push_back({id, std::move(frame), camera_from_world, std::move(none), KeyframeId{}});
+  return mutable_keyframe(id);
+}
+
+LandmarkId Map::add_landmark(const Vec3& position, KeyframeId keyframe, int keypoint) {
+  const LandmarkId id(static_cast<int32_t>(landmarks_.size()));
+  landmarks_.emplace_back();
+  Landmark& landmark = mutable_landmark(id);
+  landmark.view.position = position;
+  landmark.view.alive = true;
+  landmark.created_by = keyframe;
+  add_observation(id, keyframe, keypoint);
+  update_view(id);
+  return id;
+}
+
+bool Map::add_observation(LandmarkId id, KeyframeId keyframe_id, int keypoint) {
+  Landmark& landmark = mutable_landmark(id);
+  Keyframe& keyframe = mutable_keyframe(keyframe_id);
+  LandmarkId& slot = keyframe.landmarks.at(static_cast<size_t>(keypoint));
+  const bool seen =
+      std::ranges::any_of(landmark.observations, [&](const auto& o) { return o.keyframe == keyframe_id; });
+  if (!landmark.view.alive || seen || slot.valid()) return false;
+  slot = id;
+  landmark.observations.push_back({keyframe_id, keypoint});
+  return true;
+}
+
+void Map::remove_observation(LandmarkId id, KeyframeId keyframe) {
+  Landmark& landmark = mutable_landmark(id);
+  std::erase_if(landmark.observations, [&](const LandmarkObservation& o) {
+    if (o.keyframe != keyframe) return false;
+    mutable_keyframe(keyframe).landmarks[static_cast<size_t>(o.keypoint)] = LandmarkId{};
+    return true;
+  });
+  if (landmark.observations.empty()) landmark.view.alive = false;
+}
+
+void Map::erase_landmark(LandmarkId id) {
+  Landmark& landmark = mutable_landmark(id);
+  for (const auto& [keyframe, keypoint] : landmark.observations) {
+    mutable_keyframe(keyframe).landmarks[static_cast<size_t>(keypoint)] = LandmarkId{};
+  }
+  landmark.observations.clear();
+  landmark.view.alive = false;
+}
+
+void Map::fuse(LandmarkId from, LandmarkId to) {
+  if (from == to) return;
+  const std::vector<LandmarkObservation> moved = landmark(from).observations;
+  count_sightings(to, landmark(from).times_visible, landmark(from).times_found);
+  erase_landmark(from);
+  for (const auto& [keyframe, keypoint] : moved) add_observation(to, keyframe, keypoint);
+  mutable_landmark(from).view.replaced_by = to;
+  update_view(to);
+}
+
+void Map::update_view(LandmarkId id) {
+  Landmark& landmark = mutable_landmark(id);
+  LandmarkView& view = landmark.view;
+  if (landmark.observations.empty()) return;
+  Vec3 direction_sum = Vec3::Zero();
+  std::vector<const Descriptor*> descriptors;
+  for (const auto& [keyframe_id, keypoint] : landmark.observations) {
+    const Keyframe& observer = keyframe(keyframe_id);
+    direction_sum += (view.position - observer.camera_from_world.inverse().translation).normalized();
+    descriptors.push_back(&observer.frame->features.descriptors[static_cast<size_t>(keypoint)]);
+  }
+  view.normal = direction_sum.normalized();
+  view.descriptor = most_central(descriptors);
+
+  const auto& [first_id, first_keypoint] = landmark.observations.front();
+  const Keyframe& first = keyframe(first_id);
+  const double distance = (first.camera_from_world * view.position).norm();
+  const int octave = first.frame->features.keypoints[static_cast<size_t>(first_keypoint)].octave;
+  view.max_distance = distance * std::pow(scale_factor_, octave);
+  view.min_distance = view.max_distance / std::pow(scale_factor_, num_levels_ - 1);
+}
+
+void Map::set_position(LandmarkId id, const Vec3& position) { mutable_landmark(id).view.position = position; }
+
+void Map::set_pose(KeyframeId id, const SE3& camera_from_world) {
+  mutable_keyframe(id).camera_from_world = camera_from_world;
+}
+
+void Map::count_sightings(LandmarkId id, int visible, int found) {
+  Landmark& landmark = landmarks_[static_cast<size_t>(id.value)];  // no reader sees the counters
+  landmark.times_visible += visible;
+  landmark.times_found += found;
+}
+
+std::vector<CovisibleKeyframe> Map::covisible_keyframes(KeyframeId id, int min_shared) const {
+  std::map<KeyframeId, int> shared;
+  for (const LandmarkId landmark_id : keyframe(id).landmarks) {
+    if (!landmark_id.valid()) continue;
+    for (const LandmarkObservation& o : landmark(landmark_id).observations) ++shared[o.keyframe];
+  }
+  std::vector<CovisibleKeyframe> result;
+  for (const auto& [other, count] : shared) {
+    if (other != id && count >= min_shared) result.push_back({other, count});
+  }
+  std::ranges::stable_sort(result,
+                           [](const auto& a, const auto& b) { return a.shared_landmarks > b.shared_landmarks; });
+  return result;
+}
+
+std::shared_ptr<const MapSnapshot> Map::snapshot() {
+  auto next = published_ ? std::make_shared<MapSnapshot>(*published_) : std::make_shared<MapSnapshot>();
+  ++next->version;
+  next->keyframes.resize(keyframes_.size());
+  for (const KeyframeId id : changed_keyframes_) {
+    const Keyframe& current = keyframe(id);
+    next->keyframes[static_cast<size_t>(id.value)] = std::make_shared<const KeyframeView>(
+        KeyframeView{current, covisible_keyframes(id, kMinCovisibleLandmarks), median_landmark_depth(*this, current)});
+  }
+  next->num_landmarks = static_cast<int>(landmarks_.size());
+  next->landmark_chunks.resize((landmarks_.size() + MapSnapshot::kChunk - 1) / MapSnapshot::kChunk);
+  for (const int chunk : changed_chunks_) {
+    auto copy = std::make_shared<MapSnapshot::LandmarkChunk>();
+    const size_t begin = static_cast<size_t>(chunk) * MapSnapshot::kChunk;
+    const size_t end = std::min(begin + MapSnapshot::kChunk, landmarks_.size());
+    for (size_t i = begin; i < end; ++i) (*copy)[i - begin] = landmarks_[i].view;
+    next->landmark_chunks[static_cast<size_t>(chunk)] = std::move(copy);
+  }
+  changed_keyframes_.clear();
+  changed_chunks_.clear();
+  published_ = next;
+  return published_;
+}
+
+}  // namespace photoslam

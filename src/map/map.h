@@ -1,0 +1,68 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <set>
+#include <span>
+#include <vector>
+
+#include "map/snapshot.h"
+
+namespace photoslam {
+
+/// The geometric half of the hyper primitives map: keyframes, landmarks and who sees what.
+///
+/// Invariant: keyframe k lists landmark l at keypoint i exactly when l's observations contain (k, i), and dead
+/// landmarks have no observations. One thread writes; others read snapshots.
+class Map {
+ public:
+  /// `scale_factor` of the feature pyramid and its number of levels, to predict the level a landmark appears on.
+  Map(double scale_factor, int num_levels);
+
+  /// Adds the next keyframe (its id must be keyframes().size()) without observations.
+  Keyframe& add_keyframe(KeyframeId id, std::shared_ptr<const FeatureFrame> frame, const SE3& camera_from_world);
+  LandmarkId add_landmark(const Vec3& position, KeyframeId keyframe, int keypoint);
+
+  /// Ignored when the keyframe already sees the landmark or the keypoint already has one. Returns whether it was added.
+  bool add_observation(LandmarkId landmark, KeyframeId keyframe, int keypoint);
+  /// A landmark that loses its last observation dies.
+  void remove_observation(LandmarkId landmark, KeyframeId keyframe);
+  void erase_landmark(LandmarkId landmark);
+  /// Moves all observations of `from` to `to`; `from` then points to `to`.
+  void fuse(LandmarkId from, LandmarkId to);
+
+  /// Recomputes normal, distance range and descriptor from the observations; call after they or poses changed.
+  void update_view(LandmarkId landmark);
+  void set_position(LandmarkId landmark, const Vec3& position);
+  void set_pose(KeyframeId keyframe, const SE3& camera_from_world);
+
+  size_t num_keyframes() const { return keyframes_.size(); }
+  size_t num_landmarks() const { return landmarks_.size(); }
+  const Keyframe& keyframe(KeyframeId id) const { return keyframes_[static_cast<size_t>(id.value)]; }
+  const Landmark& landmark(LandmarkId id) const { return landmarks_[static_cast<size_t>(id.value)]; }
+  /// Counts sightings by tracked frames.
+  void count_sightings(LandmarkId id, int visible, int found);
+  void set_parent(KeyframeId keyframe, KeyframeId parent) { mutable_keyframe(keyframe).parent = parent; }
+
+  /// Keyframes sharing at least `min_shared` landmarks with this one, strongest first, ties by id.
+  std::vector<CovisibleKeyframe> covisible_keyframes(KeyframeId id, int min_shared) const;
+
+  /// Publishes the present state; unchanged parts are shared with the previous snapshot.
+  std::shared_ptr<const MapSnapshot> snapshot();
+
+ private:
+  Keyframe& mutable_keyframe(KeyframeId id);
+  Landmark& mutable_landmark(LandmarkId id);
+
+  double scale_factor_;
+  int num_levels_;
+  std::deque<Keyframe> keyframes_;
+  std::deque<Landmark> landmarks_;
+  std::set<KeyframeId> changed_keyframes_;  // since the last snapshot
+  std::set<int> changed_chunks_;
+  std::shared_ptr<const MapSnapshot> published_;
+};
+
+}  // namespace photoslam

@@ -1,0 +1,46 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "map/keyframe.h"
+#include "map/landmark.h"
+
+namespace photoslam {
+
+/// Keyframes sharing landmarks, strongest first.
+struct CovisibleKeyframe {
+  KeyframeId keyframe;
+  int shared_landmarks = 0;
+};
+
+/// A keyframe as readers see it.
+struct KeyframeView {
+  Keyframe keyframe;
+  std::vector<CovisibleKeyframe> covisible;
+  double median_depth = 0;  ///< Of its landmarks [m]; 0 when it has none.
+};
+
+/// An unchanging picture of the map. Parts that did not change are shared with earlier snapshots, so publishing costs
+/// what changed.
+class MapSnapshot {
+ public:
+  static constexpr int kChunk = 256;  ///< Landmarks per shared chunk.
+  using LandmarkChunk = std::array<LandmarkView, kChunk>;
+
+  uint64_t version = 0;
+  std::vector<std::shared_ptr<const KeyframeView>> keyframes;         ///< [K] by KeyframeId.
+  std::vector<std::shared_ptr<const LandmarkChunk>> landmark_chunks;  ///< By LandmarkId / kChunk.
+  int num_landmarks = 0;                                              ///< Ids given out, dead ones included.
+
+  bool has(KeyframeId id) const { return id.valid() && static_cast<size_t>(id.value) < keyframes.size(); }
+  const KeyframeView& keyframe(KeyframeId id) const { return *keyframes[static_cast<size_t>(id.value)]; }
+
+  /// The landmark, or the one that replaced it; nullptr when it is dead or not part of this snapshot. `id` is updated.
+  const LandmarkView* find(LandmarkId& id) const;
+};
+
+}  // namespace photoslam
