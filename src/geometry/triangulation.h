@@ -10,7 +10,7 @@
 namespace photoslam {
 
 /// One camera's view of a point to be triangulated.
-struct View {
+struct PointView {
   SE3 camera_from_world;
   Vec2 pixel = Vec2::Zero();
   double sigma = 1.0;  ///< Standard deviation of the pixel [px].
@@ -23,7 +23,7 @@ struct TriangulationLimits {
 
 /// The point seen in two views, in the world frame; nothing when the rays are nearly parallel, the point lies behind a
 /// camera, or it does not reproject. Midpoint weighted for the smallest reprojection error (inverse-depth weighted).
-std::optional<Vec3> triangulate(const PinholeCamera& camera, const View& a, const View& b,
+std::optional<Vec3> triangulate(const PinholeCamera& camera, const PointView& a, const PointView& b,
                                 const TriangulationLimits& limits = {});
 
 /// Angle [rad] at `point` between the directions to two camera centres (all in the world frame).

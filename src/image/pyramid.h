@@ -8,7 +8,7 @@
 namespace photoslam {
 
 /// What a camera saw, pixel by pixel. Depth and mask may be absent (empty); else all have the camera's size.
-struct View {
+struct CameraView {
   PinholeCamera camera;
   ImageU8 color;   ///< RGB or grey.
   ImageU16 depth;  ///< 0 = no measurement.
@@ -20,7 +20,7 @@ struct View {
 /// Colour is the mean over factor x factor blocks (rounded), a true low-pass; the mask keeps blocks whose every pixel
 /// has data; depth is the median of a block's measurements, where at least half of its pixels have one, so that no
 /// depth between two surfaces is invented. A rest at the right and bottom is dropped; factor ≥ 1.
-View shrink(const View& view, int factor);
+CameraView shrink(const CameraView& view, int factor);
 
 /// The parts of it.
 ImageU8 shrink_color(const ImageU8& color, int factor);
