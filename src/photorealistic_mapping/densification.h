@@ -1,0 +1,36 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "base/options.h"
+#include "base/random.h"
+#include "splatting/model.h"
+
+namespace photoslam {
+
+struct DensificationOptions {
+  bool enabled = true;
+  int interval = 200;
+  double gradient_threshold = 4e-4;
+  double split_size = 0.01;
+  double min_opacity = 0.03;
+  double max_scale = 0.25;
+  double min_weight = 0.02;
+  int max_gaussians = 300000;
+  void visit(OptionVisitor& visitor);
+};
+
+struct DensificationCounts {
+  size_t cloned = 0, split = 0, pruned = 0;
+};
+
+/// Adaptive density control as in 3D Gaussian splatting (Kerbl et al. 2023), on the statistics since the last call:
+/// where the screen-space gradient stays large, small gaussians are cloned and large ones split in two; children stay
+/// with the parent's anchor. `scene_depth` [m] is the scale of the scene. Resets the statistics.
+DensificationCounts densify(const DensificationOptions& options, double scene_depth, Random& random,
+                            splatting::GaussianModel& model);
+
+/// Removes gaussians that are nearly transparent, larger than max_scale * scene_depth, or not finite.
+size_t prune(const DensificationOptions& options, double scene_depth, splatting::GaussianModel& model);
+
+}  // namespace photoslam

@@ -1,0 +1,46 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "photorealistic_mapping/keyframe_schedule.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "base/check.h"
+
+namespace photoslam {
+
+void ScheduleOptions::visit(OptionVisitor& v) {
+  v.value({"pyramid_levels", "", 0, 3, "Levels above the full image on which training starts; n in Eq. (5)."},
+          pyramid_levels);
+  v.value({"uses_per_level", "", 1, 1000, "Training steps of a keyframe before it moves to the next finer level."},
+          uses_per_level);
+  v.value({"online_level", "", 0, 3, "Finest level while frames arrive; 1 is half resolution."}, online_level);
+  v.value({"newest_probability", "", 0.0, 1.0, "Share of the steps that go to the newest keyframe."},
+          newest_probability);
+}
+
+int KeyframeSchedule::draw() {
+  if (round_.empty()) {
+    round_.resize(uses_.size());
+    std::iota(round_.begin(), round_.end(), 0);
+  }
+  const auto position = static_cast<size_t>(random_.index(static_cast<int>(round_.size())));
+  const int view = round_[position];
+  round_[position] = round_.back();
+  round_.pop_back();
+  return view;
+}
+
+KeyframeSchedule::Choice KeyframeSchedule::next(bool refining) {
+  PHOTOSLAM_CHECK(!uses_.empty());
+  Choice choice;
+  const bool newest = !refining && random_.uniform() < options_.newest_probability;
+  choice.view = newest ? num_views() - 1 : draw();
+  int& uses = uses_[static_cast<size_t>(choice.view)];
+  const int finest = refining ? 0 : std::min(options_.online_level, options_.pyramid_levels);
+  choice.level = std::max(finest, options_.pyramid_levels - uses / options_.uses_per_level);
+  ++uses;
+  return choice;
+}
+
+}  // namespace photoslam

@@ -1,0 +1,218 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "photorealistic_mapping/photorealistic_mapper.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/check.h"
+#include "photorealistic_mapping/view_geometry.h"
+
+namespace photoslam {
+namespace {
+
+constexpr int kSeedingFactor = 2;  // seeds are made on the half-size image: cheaper, and its noise is lower
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Inactive features (without a landmark) that have a depth, and landmarks where the map has them.
+std::vector<DepthPixel> feature_seeds(const MapSnapshot& map, const Keyframe& keyframe) {
+  std::vector<DepthPixel> pixels;
+  for (size_t i = 0; i < keyframe.frame->size(); ++i) {
+    const Keypoint& keypoint = keyframe.frame->features.keypoints[i];
+    LandmarkId id = keyframe.landmarks[i];
+    float depth = keyframe.frame->depth[i];
+    if (const LandmarkView* landmark = map.find(id)) {
+      depth = static_cast<float>((keyframe.camera_from_world * landmark->position).z());
+    }
+    if (depth > 0) pixels.push_back({keypoint.x, keypoint.y, depth});
+  }
+  return pixels;
+}
+
+}  // namespace
+
+void LearningRateOptions::visit(OptionVisitor& v) {
+  v.value({"mean", "", 0.0, 1.0, "Step of the centres, relative to the depth of the scene."}, mean);
+  v.value({"rotation", "", 0.0, 1.0, "Step of the quaternions."}, rotation);
+  v.value({"log_scale", "", 0.0, 1.0, "Step of the logarithms of the extents."}, log_scale);
+  v.value({"opacity", "", 0.0, 5.0, "Step of the logit of the opacity."}, opacity);
+  v.value({"color", "", 0.0, 1.0, "Step of the constant colour coefficient."}, color);
+  v.value({"color_rest", "", 0.0, 1.0, "Step of the view-dependent coefficients."}, color_rest);
+  v.value({"final_factor", "", 1e-4, 1.0, "Refinement lowers all steps exponentially to this share."}, final_factor);
+}
+
+void PhotorealisticOptions::visit(OptionVisitor& v) {
+  v.value({"ssim_weight_online", "", 0.0, 1.0, "Weight λ of the structural term in Eq. (4) while frames arrive."},
+          ssim_weight_online);
+  v.value({"ssim_weight", "", 0.0, 1.0, "The same during refinement."}, ssim_weight);
+  v.value({"depth_weight", "", 0.0, 10.0, "Weight of the depth loss where depth is measured."}, depth_weight);
+  v.value({"sh_degree", "", 0, 3, "Degree of the spherical harmonics that make colours depend on the view."},
+          sh_degree);
+  v.value({"near_m", "m", 1e-4, 1.0, "Gaussians nearer to the camera are not drawn."}, near_m);
+  v.value(
+      {"reseed_interval", "iterations", 0, 100000, "Between two rounds of dense seeding in old keyframes; 0: never."},
+      reseed_interval);
+  v.value({"reseed_color_error", "", 0.0, 3.0, "Squared colour error above which old keyframes are seeded again."},
+          reseed_color_error);
+  v.group("seeding", "Where and how gaussians are born.", seeding);
+  v.group("schedule", "Which keyframe is trained, at which resolution.", schedule);
+  v.group("rates", "Step sizes of Adam.", rates);
+  v.group("densification", "Split, clone and prune.", densification);
+  v.group("poses", "Photometric refinement of keyframe poses.", poses);
+}
+
+PhotorealisticMapper::PhotorealisticMapper(const PhotorealisticOptions& options, const PinholeCamera& camera,
+                                           double metres_per_depth_unit, ImageU8 mask, uint64_t seed)
+    : options_(options),
+      camera_(camera),
+      metres_per_depth_unit_(metres_per_depth_unit),
+      mask_(std::move(mask)),
+      random_(seed),
+      schedule_(options.schedule, seed + 1) {
+  model_.set_sh_degree(options.sh_degree);
+}
+
+void PhotorealisticMapper::update_poses(const MapSnapshot& map) {
+  std::vector<double> depths;
+  for (size_t i = 0; i < anchors_from_world_.size(); ++i) {
+    const KeyframeView& keyframe = map.keyframe(KeyframeId(static_cast<int32_t>(i)));
+    anchors_from_world_[i] = keyframe.keyframe.camera_from_world;
+    if (keyframe.median_depth > 0) depths.push_back(keyframe.median_depth);
+  }
+  if (!depths.empty()) scene_depth_ = median(std::move(depths));
+}
+
+void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, const KeyframeImages& images,
+                                        Executor& executor) {
+  PHOTOSLAM_CHECK(static_cast<size_t>(id.value) == views_.size(), "keyframe {} after {}", id.value, views_.size());
+  const Keyframe& keyframe = map.keyframe(id).keyframe;
+  anchors_from_world_.push_back(keyframe.camera_from_world);
+  model_.add_anchor();
+  schedule_.add_view();
+  update_poses(map);
+
+  TrainingView& view = views_.emplace_back();
+  const CameraView full{camera_, images.color, images.depth, mask_};
+  for (int level = 0; level <= options_.schedule.pyramid_levels; ++level) {
+    const CameraView small = level == 0 ? full : shrink(full, 1 << level);
+    view.cameras.push_back(small.camera);
+    splatting::TargetImage& target =
+        view.targets.emplace_back(small.camera.width, small.camera.height, small.color.values(), small.mask.values());
+    if (!small.depth.empty()) target.set_depth(small.depth.values(), static_cast<float>(metres_per_depth_unit_));
+  }
+  view.seeding_view = shrink(full, kSeedingFactor);
+  const std::vector<DepthPixel> features = feature_seeds(map, keyframe);
+  seed(views_.size() - 1, options_.seeding.cell_px, options_.seeding.min_color_error, features, executor);
+  prune(options_.densification, scene_depth_, model_);
+}
+
+SE3 PhotorealisticMapper::view_from_world(size_t view) const {
+  return views_[view].adjustment.correction() * anchors_from_world_[view];
+}
+
+splatting::RenderOptions PhotorealisticMapper::render_options() const {
+  splatting::RenderOptions render;
+  render.near = static_cast<float>(options_.near_m);
+  return render;
+}
+
+void PhotorealisticMapper::seed(size_t index, int cell, double min_color_error, std::span<const DepthPixel> features,
+                                Executor& executor) {
+  const TrainingView& view = views_[index];
+  const CameraView& small = view.seeding_view;
+  camera_from_anchors(view_from_world(index), anchors_from_world_, camera_from_anchor_);
+  renderer_.render(model_, {to_splatting(small.camera), camera_from_anchor_}, render_options(), executor, render_);
+  auto seeds = seed_cells(options_.seeding, small, metres_per_depth_unit_, render_, std::max(1, cell / kSeedingFactor),
+                          min_color_error);
+  const auto at_features = seed_features(options_.seeding, small, kSeedingFactor, render_, features);
+  seeds.insert(seeds.end(), at_features.begin(), at_features.end());
+  const auto limit = static_cast<size_t>(options_.densification.max_gaussians);
+  seeds.resize(std::min(seeds.size(), limit - std::min(limit, model_.size())));
+  // Seeds are made in the frame of the adjusted view; the anchor is the geometric keyframe.
+  const SE3 anchor_from_view = view.adjustment.correction().inverse();
+  for (splatting::Gaussian& g : seeds) {
+    const Vec3 mean = anchor_from_view * Vec3(static_cast<double>(g.mean[0]), static_cast<double>(g.mean[1]),
+                                              static_cast<double>(g.mean[2]));
+    const Quat rotation =
+        anchor_from_view.rotation * Quat(static_cast<double>(g.rotation[0]), static_cast<double>(g.rotation[1]),
+                                         static_cast<double>(g.rotation[2]), static_cast<double>(g.rotation[3]));
+    for (int i = 0; i < 3; ++i) g.mean[i] = static_cast<float>(mean[i]);
+    g.rotation[0] = static_cast<float>(rotation.w());
+    for (int i = 0; i < 3; ++i) g.rotation[i + 1] = static_cast<float>(rotation.vec()[i]);
+  }
+  model_.add(static_cast<int>(index), seeds, 0, static_cast<uint32_t>(iteration_));
+}
+
+splatting::TrainOptions PhotorealisticMapper::train_options(std::optional<double> progress) const {
+  const double decay = progress ? std::pow(options_.rates.final_factor, *progress) : 1.0;
+  splatting::TrainOptions train;
+  train.render = render_options();
+  const auto rate = [&](double value) { return static_cast<float>(decay * value); };
+  train.rates = {.mean = rate(options_.rates.mean * scene_depth_),
+                 .rotation = rate(options_.rates.rotation),
+                 .log_scale = rate(options_.rates.log_scale),
+                 .opacity = rate(options_.rates.opacity),
+                 .sh_dc = rate(options_.rates.color),
+                 .sh_rest = rate(options_.rates.color_rest)};
+  train.beta2 = 0.99f;
+  train.ssim_weight = static_cast<float>(progress ? options_.ssim_weight : options_.ssim_weight_online);
+  train.depth_weight = static_cast<float>(options_.depth_weight);
+  return train;
+}
+
+splatting::StepResult PhotorealisticMapper::train(std::optional<double> progress, Executor& executor) {
+  const KeyframeSchedule::Choice choice = schedule_.next(progress.has_value());
+  const auto index = static_cast<size_t>(choice.view);
+  const auto level = static_cast<size_t>(choice.level);
+  TrainingView& view = views_[index];
+  const splatting::TrainOptions options = train_options(progress);
+  camera_from_anchors(view_from_world(index), anchors_from_world_, camera_from_anchor_);
+  const splatting::StepResult result = trainer_.step(model_, {to_splatting(view.cameras[level]), camera_from_anchor_},
+                                                     view.targets[level], options, executor);
+
+  // The first keyframe defines the world and stays.
+  if (options_.poses.enabled && choice.view > 0) {
+    const double decay = progress ? std::pow(options_.rates.final_factor, *progress) : 1.0;
+    view.adjustment.step(options_.poses, scene_depth_, decay, result.pose_gradient);
+  }
+  const double psnr = -10.0 * std::log10(std::max(static_cast<double>(result.mse), 1e-10));
+  constexpr double kMemory = 0.98;
+  training_psnr_ = iteration_ == 0 ? psnr : kMemory * training_psnr_ + (1.0 - kMemory) * psnr;
+  ++iteration_;
+  maintain(progress, executor);
+  return result;
+}
+
+void PhotorealisticMapper::maintain(std::optional<double> progress, Executor& executor) {
+  constexpr double kGrowthEnd = 0.6;  // share of the refinement after which the map only settles
+  const bool growing = !progress || *progress < kGrowthEnd;
+  if (growing && options_.reseed_interval > 0 && iteration_ % options_.reseed_interval == 0) {
+    const auto view = static_cast<size_t>(random_.index(static_cast<int>(views_.size())));
+    seed(view, options_.seeding.cell_px / 2, options_.reseed_color_error, {}, executor);
+  }
+  if (iteration_ % options_.densification.interval != 0) return;
+  if (growing && progress && options_.densification.enabled) {
+    densify(options_.densification, scene_depth_, random_, model_);
+  }
+  prune(options_.densification, scene_depth_, model_);
+}
+
+FrozenMap PhotorealisticMapper::freeze() const {
+  FrozenMap frozen;
+  frozen.anchors_from_world = anchors_from_world_;
+  frozen.gaussians.set_sh_degree(model_.sh_degree());
+  std::vector<std::vector<splatting::Gaussian>> of_anchor(views_.size());
+  model_.for_each([&](size_t i) { of_anchor[static_cast<size_t>(model_.anchor(i))].push_back(model_.get(i)); });
+  for (size_t i = 0; i < views_.size(); ++i) {
+    frozen.keyframes_from_world.push_back(view_from_world(i));
+    frozen.gaussians.add(frozen.gaussians.add_anchor(), of_anchor[i]);
+  }
+  return frozen;
+}
+
+}  // namespace photoslam

@@ -1,0 +1,112 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "base/executor.h"
+#include "base/options.h"
+#include "map/snapshot.h"
+#include "photorealistic_mapping/densification.h"
+#include "photorealistic_mapping/keyframe_schedule.h"
+#include "photorealistic_mapping/pose_adjustment.h"
+#include "photorealistic_mapping/seeding.h"
+#include "splatting/trainer.h"
+
+namespace photoslam {
+
+struct LearningRateOptions {
+  double mean = 2.4e-4;
+  double rotation = 5e-3;
+  double log_scale = 0.025;
+  double opacity = 0.25;
+  double color = 0.0125;
+  double color_rest = 6e-4;
+  double final_factor = 0.1;
+  void visit(OptionVisitor& visitor);
+};
+
+struct PhotorealisticOptions {
+  double ssim_weight_online = 0.0;
+  double ssim_weight = 0.2;
+  double depth_weight = 0.0;
+  int sh_degree = 1;
+  double near_m = 0.01;
+  int reseed_interval = 25;
+  double reseed_color_error = 0.03;
+  SeedingOptions seeding;
+  ScheduleOptions schedule;
+  LearningRateOptions rates;
+  DensificationOptions densification;
+  PoseAdjustmentOptions poses;
+  void visit(OptionVisitor& visitor);
+};
+
+/// The gaussians and the keyframe poses at one moment: all that rendering needs.
+struct FrozenMap {
+  splatting::GaussianModel gaussians;
+  std::vector<SE3> anchors_from_world;    ///< [K] geometric keyframe poses: frames of the gaussians.
+  std::vector<SE3> keyframes_from_world;  ///< [K] camera_from_world, photometrically adjusted: what trajectories use.
+};
+
+/// Photorealistic mapping (paper, Sec. 3.3 and 3.4): trains the gaussians of the hyper primitives map on keyframe
+/// images by splatting, with geometry-based densification and Gaussian-pyramid learning. Synchronous; deterministic for
+/// a seed, at any concurrency of the executor.
+class PhotorealisticMapper {
+ public:
+  PhotorealisticMapper(const PhotorealisticOptions& options, const PinholeCamera& camera, double metres_per_depth_unit,
+                       ImageU8 mask, uint64_t seed);
+
+  /// Takes over the poses of all keyframes.
+  void update_poses(const MapSnapshot& map);
+
+  /// Starts training on the next keyframe (by id) and seeds the part of its image that the map does not explain.
+  void add_keyframe(const MapSnapshot& map, KeyframeId id, const KeyframeImages& images, Executor& executor);
+
+  /// One training iteration, Eq. (4). At least one keyframe is needed. `progress` in [0, 1] says how much of the
+  /// refinement is done; empty while frames arrive.
+  splatting::StepResult train(std::optional<double> progress, Executor& executor);
+
+  bool has_keyframes() const { return !views_.empty(); }
+  const splatting::GaussianModel& gaussians() const { return model_; }
+  int num_iterations() const { return iteration_; }
+  /// Running mean of the PSNR of the training views, as rendered [dB]; 0 before the first iteration.
+  double training_psnr() const { return training_psnr_; }
+  FrozenMap freeze() const;
+
+ private:
+  /// A keyframe as training material.
+  struct TrainingView {
+    PoseAdjustment adjustment;           // photometric correction of the keyframe's pose
+    std::vector<PinholeCamera> cameras;  // [levels + 1]
+    std::vector<splatting::TargetImage> targets;
+    CameraView seeding_view;  // level 1, with depth
+  };
+
+  SE3 view_from_world(size_t view) const;
+  splatting::RenderOptions render_options() const;
+  splatting::TrainOptions train_options(std::optional<double> progress) const;
+  void seed(size_t view, int cell, double min_color_error, std::span<const DepthPixel> features, Executor& executor);
+  void maintain(std::optional<double> progress, Executor& executor);
+
+  PhotorealisticOptions options_;
+  PinholeCamera camera_;
+  double metres_per_depth_unit_;
+  ImageU8 mask_;
+  Random random_;
+  KeyframeSchedule schedule_;
+  splatting::GaussianModel model_;
+  splatting::Trainer trainer_;
+  splatting::Renderer renderer_;
+  splatting::RenderResult render_;
+  std::vector<splatting::Pose> camera_from_anchor_;
+  std::vector<SE3> anchors_from_world_;
+  std::vector<TrainingView> views_;
+  double scene_depth_ = 1.0;  // median over keyframes of their median depth [m]
+  int iteration_ = 0;
+  double training_psnr_ = 0;
+};
+
+}  // namespace photoslam

@@ -1,0 +1,54 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "base/options.h"
+#include "image/image.h"
+#include "image/pyramid.h"
+#include "splatting/gaussian.h"
+#include "splatting/renderer.h"
+
+namespace photoslam {
+
+struct SeedingOptions {
+  int cell_px = 8;
+  double sigma_cells = 0.7;
+  double thickness = 0.2;
+  double max_stretch = 2.9;
+  double opacity = 0.3;
+  double min_transmittance = 0.5;
+  double min_depth_ratio = 0.9;
+  double min_color_error = 0.10;
+  double feature_sigma_px = 2.0;
+  double feature_color_error = 0.05;
+  void visit(OptionVisitor& visitor);
+};
+
+/// A pixel of the full image with a measured depth [m].
+struct DepthPixel {
+  float x = 0, y = 0;
+  float depth = 0;
+};
+
+/// New gaussians in the frame of the view's camera.
+///
+/// A cell of the image becomes one gaussian, a disc on the measured surface as large as its cell, where `render` (of
+/// the present map, same camera) does not explain it: mostly transparent, behind the measurement, or of another colour.
+/// Cells without depth take the nearest measured one, and only where the map is transparent.
+///
+/// `cell` is in pixels of `view`; `metres_per_depth_unit` scales its depth.
+std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const CameraView& view,
+                                            double metres_per_depth_unit, const splatting::RenderResult& render,
+                                            int cell, double min_color_error);
+
+/// Geometry-based densification (paper, Sec. 3.3.1): gaussians at features, the places of complex texture, as large as
+/// their pixel's footprint, where the render of the present map does not explain the pixel. `view` is the full image
+/// shrunk by `factor`.
+std::vector<splatting::Gaussian> seed_features(const SeedingOptions& options, const CameraView& view, int factor,
+                                               const splatting::RenderResult& render,
+                                               std::span<const DepthPixel> features);
+
+}  // namespace photoslam

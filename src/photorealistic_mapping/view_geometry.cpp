@@ -1,0 +1,26 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "photorealistic_mapping/view_geometry.h"
+
+namespace photoslam {
+
+splatting::Camera to_splatting(const PinholeCamera& camera) {
+  return {camera.width,
+          camera.height,
+          static_cast<float>(camera.fx),
+          static_cast<float>(camera.fy),
+          static_cast<float>(camera.cx),
+          static_cast<float>(camera.cy)};
+}
+
+void camera_from_anchors(const SE3& camera_from_world, std::span<const SE3> anchors_from_world,
+                         std::vector<splatting::Pose>& camera_from_anchor) {
+  camera_from_anchor.resize(anchors_from_world.size());
+  for (size_t i = 0; i < anchors_from_world.size(); ++i) {
+    const SE3 pose = camera_from_world * anchors_from_world[i].inverse();
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(camera_from_anchor[i].rotation) = pose.matrix3();
+    Eigen::Map<Vec3>(camera_from_anchor[i].translation) = pose.translation;
+  }
+}
+
+}  // namespace photoslam

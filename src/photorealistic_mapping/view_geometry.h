@@ -1,0 +1,22 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "camera/pinhole.h"
+#include "math/se3.h"
+#include "splatting/view.h"
+
+namespace photoslam {
+
+/// The camera as the splatting engine takes it.
+splatting::Camera to_splatting(const PinholeCamera& camera);
+
+/// Where a camera is, seen from every anchor keyframe: composed in double precision, so that nothing is lost far from
+/// the origin. Writes [anchors] poses.
+void camera_from_anchors(const SE3& camera_from_world, std::span<const SE3> anchors_from_world,
+                         std::vector<splatting::Pose>& camera_from_anchor);
+
+}  // namespace photoslam
