@@ -228,13 +228,13 @@ std::string unit_and_range(const Leaf& leaf) {
 
 }  // namespace
 
-Status load_config(const std::filesystem::path& file, OptionsRef options) {
+Status load_config(const std::filesystem::path& file, const OptionsRef& options) {
   const Result<std::string> content = read_file(file);
   if (!content.ok()) return content.error();
   return parse_config(*content, file.string(), options);
 }
 
-Status parse_config(std::string_view toml, std::string_view name, OptionsRef options) {
+Status parse_config(std::string_view toml, std::string_view name, const OptionsRef& options) {
   const std::vector<Group> groups = collect(options);
   TableReader reader(name, groups);
   try {
@@ -247,7 +247,7 @@ Status parse_config(std::string_view toml, std::string_view name, OptionsRef opt
   return {};
 }
 
-Status apply_setting(std::string_view assignment, OptionsRef options) {
+Status apply_setting(std::string_view assignment, const OptionsRef& options) {
   const size_t equals = assignment.find('=');
   if (equals == std::string_view::npos || equals == 0)
     return error("--set {}: expected key=value, such as --set seed=7", assignment);
@@ -261,14 +261,14 @@ Status apply_setting(std::string_view assignment, OptionsRef options) {
   return {};
 }
 
-std::vector<ConfigEntry> config_values(OptionsRef options) {
+std::vector<ConfigEntry> config_values(const OptionsRef& options) {
   std::vector<ConfigEntry> entries;
   for (const Group& group : collect(options))
     for (const Leaf& leaf : group.leaves) entries.push_back({leaf.key, current_value(leaf)});
   return entries;
 }
 
-std::vector<ConfigEntry> changed_values(OptionsRef options, OptionsRef defaults) {
+std::vector<ConfigEntry> changed_values(const OptionsRef& options, const OptionsRef& defaults) {
   std::vector<ConfigEntry> changed = config_values(options);
   const std::vector<ConfigEntry> original = config_values(defaults);
   PHOTOSLAM_CHECK(changed.size() == original.size(), "{} values, {} defaults", changed.size(), original.size());
@@ -284,7 +284,7 @@ std::string to_toml(const ConfigValue& value) {
   return quoted(std::get<std::string>(value));
 }
 
-std::string config_as_toml(OptionsRef options) {
+std::string config_as_toml(const OptionsRef& options) {
   std::string text;
   for (const Group& group : collect(options)) {
     if (!group.key.empty()) text += fmt::format("\n# {}\n[{}]\n", group.doc, group.key);
@@ -297,7 +297,7 @@ std::string config_as_toml(OptionsRef options) {
   return text;
 }
 
-std::string config_manual(OptionsRef defaults) {
+std::string config_manual(const OptionsRef& defaults) {
   std::string text;
   for (const Group& group : collect(defaults)) {
     if (!group.key.empty()) text += fmt::format("\n## `[{}]`\n\n{}\n", group.key, group.doc);

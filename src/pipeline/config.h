@@ -41,27 +41,27 @@ struct ConfigEntry {
 ///
 /// Syntax errors, unknown keys (with the nearest known one), wrong types and values out of range are errors that start
 /// with file:line:column; then no option is changed.
-Status load_config(const std::filesystem::path& file, OptionsRef options);
+Status load_config(const std::filesystem::path& file, const OptionsRef& options);
 
 /// The same for TOML text; `name` stands for the file in messages.
-Status parse_config(std::string_view toml, std::string_view name, OptionsRef options);
+Status parse_config(std::string_view toml, std::string_view name, const OptionsRef& options);
 
 /// Sets one option from "key=value", as given to --set. Text needs no quotes.
-Status apply_setting(std::string_view assignment, OptionsRef options);
+Status apply_setting(std::string_view assignment, const OptionsRef& options);
 
 /// Every value, in the order of the visit.
-std::vector<ConfigEntry> config_values(OptionsRef options);
+std::vector<ConfigEntry> config_values(const OptionsRef& options);
 
 /// The values that differ from those of `defaults`, which must be of the same type.
-std::vector<ConfigEntry> changed_values(OptionsRef options, OptionsRef defaults);
+std::vector<ConfigEntry> changed_values(const OptionsRef& options, const OptionsRef& defaults);
 
 /// The value as TOML writes it.
 std::string to_toml(const ConfigValue& value);
 
 /// A complete configuration file: every value with unit, range and explanation as comments. Loads back unchanged.
-std::string config_as_toml(OptionsRef options);
+std::string config_as_toml(const OptionsRef& options);
 
 /// The reference manual of the configuration in Markdown: one table per group, the values being the defaults.
-std::string config_manual(OptionsRef defaults);
+std::string config_manual(const OptionsRef& defaults);
 
 }  // namespace photoslam

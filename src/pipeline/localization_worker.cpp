@@ -1,0 +1,74 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "pipeline/localization_worker.h"
+
+#include "base/clock.h"
+#include "image/convert.h"
+
+namespace photoslam {
+namespace {
+
+double milliseconds(SteadyTime from, SteadyTime to) {
+  return std::chrono::duration<double, std::milli>(to - from).count();
+}
+
+}  // namespace
+
+LocalizationWorker::LocalizationWorker(const SystemOptions& options, const RunSettings& settings,
+                                       const SourceInfo& info)
+    : settings_(settings),
+      info_(info),
+      camera_(info.camera),
+      builder_(options.features, options.depth, info.camera, info.metres_per_depth_unit),
+      tracker_(options.localization, options.features, info.camera, builder_.bf()) {
+  if (!info.distortion.none()) undistorter_.emplace(info.camera, info.distortion);
+}
+
+bool LocalizationWorker::is_mapped(const Frame& frame) {
+  if (!first_ns_) first_ns_ = frame.timestamp_ns;
+  return 1e-9 * static_cast<double>(frame.timestamp_ns - *first_ns_) <= settings_.map_until_s;
+}
+
+FrameOutcome LocalizationWorker::process(FedFrame fed, std::shared_ptr<const MapSnapshot> map, bool keyframes_allowed,
+                                         std::optional<NewKeyframe>& keyframe) {
+  Frame& frame = fed.frame;
+  FrameOutcome outcome;
+  outcome.frame = frame.id;
+  outcome.timestamp_ns = frame.timestamp_ns;
+  outcome.held_out = settings_.hold_out > 0 && frame.id.value % settings_.hold_out == settings_.hold_out - 1;
+  outcome.queue_wait_ms = milliseconds(fed.queued, std::chrono::steady_clock::now());
+  if (!frame.defect.empty()) {
+    outcome.reason = frame.defect;
+    return outcome;
+  }
+
+  const Stopwatch wall;
+  const double cpu_before = thread_cpu_seconds();
+  ImageU8 color = undistorter_ ? undistorter_->color(frame.color) : std::move(frame.color);
+  ImageU16 depth = undistorter_ && !frame.depth.empty() ? undistorter_->depth(frame.depth) : std::move(frame.depth);
+  const auto features = builder_.build(frame.id, frame.timestamp_ns, to_grey(color), depth);
+  const bool may_become_keyframe = keyframes_allowed && !outcome.held_out && is_mapped(frame);
+  TrackingResult result = tracker_.track(features, std::move(map), may_become_keyframe);
+  outcome.tracking_ms = wall.milliseconds();
+  outcome.blocked_ms = outcome.tracking_ms - 1e3 * (thread_cpu_seconds() - cpu_before);
+  if (settings_.pace == Pace::realtime) {
+    outcome.latency_ms = milliseconds(fed.due, std::chrono::steady_clock::now());
+  }
+
+  outcome.state = result.state;
+  outcome.reason = std::move(result.reason);
+  outcome.num_features = result.num_features;
+  outcome.num_inliers = result.num_inliers;
+  outcome.has_pose = result.has_pose;
+  outcome.online_camera_from_world = result.camera_from_world;
+  outcome.reference = result.reference;
+  outcome.camera_from_reference = result.camera_from_reference;
+  if (result.keyframe) {
+    outcome.keyframe = result.keyframe->id;
+    auto images = std::make_shared<KeyframeImages>(KeyframeImages{to_rgb(color), std::move(depth)});
+    keyframe = NewKeyframe{std::move(*result.keyframe), std::move(images)};
+  }
+  return outcome;
+}
+
+}  // namespace photoslam

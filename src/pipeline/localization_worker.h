@@ -1,0 +1,48 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "image/undistort.h"
+#include "localization/feature_frame_builder.h"
+#include "localization/tracker.h"
+#include "pipeline/frame_feed.h"
+#include "pipeline/system_options.h"
+
+namespace photoslam {
+
+/// A frame that became a keyframe, on its way through the mapping stages.
+struct NewKeyframe {
+  KeyframeProposal proposal;
+  std::shared_ptr<const KeyframeImages> images;
+};
+
+/// Everything that happens to a frame before mapping: undistortion, features, tracking, and bookkeeping of times.
+class LocalizationWorker {
+ public:
+  LocalizationWorker(const SystemOptions& options, const RunSettings& settings, const SourceInfo& info);
+
+  const PinholeCamera& camera() const { return camera_; }
+  double bf() const { return builder_.bf(); }
+  /// Pixels with data; empty when all have.
+  ImageU8 mask() const { return undistorter_ ? undistorter_->mask() : ImageU8{}; }
+
+  /// `keyframes_allowed` is false while mapping cannot take another one.
+  FrameOutcome process(FedFrame fed, std::shared_ptr<const MapSnapshot> map, bool keyframes_allowed,
+                       std::optional<NewKeyframe>& keyframe);
+
+ private:
+  bool is_mapped(const Frame& frame);
+
+  RunSettings settings_;
+  SourceInfo info_;
+  PinholeCamera camera_;
+  std::optional<Undistorter> undistorter_;
+  FeatureFrameBuilder builder_;
+  Tracker tracker_;
+  std::optional<int64_t> first_ns_;
+};
+
+}  // namespace photoslam

@@ -1,0 +1,52 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "pipeline/mapping_worker.h"
+
+#include "base/clock.h"
+
+namespace photoslam {
+
+MappingWorker::MappingWorker(const SystemOptions& options, const RunSettings& settings, const PinholeCamera& camera,
+                             double metres_per_depth_unit, ImageU8 mask, Executor& executor)
+    : mapper_(options.photorealistic_mapping, camera, metres_per_depth_unit, std::move(mask), settings.seed),
+      executor_(executor) {}
+
+void MappingWorker::freeze_if_due() {
+  if (online_ || std::chrono::steady_clock::now().time_since_epoch().count() < freeze_time_) return;
+  online_ = mapper_.freeze();
+}
+
+void MappingWorker::handle(MappingMessage message) {
+  freeze_if_due();
+  if (const auto* update = std::get_if<MapUpdate>(&message)) {
+    mapper_.add_keyframe(*update->map, update->keyframe, *update->images, executor_);
+  } else {
+    train(std::get<TrainingBudget>(message).iterations);
+  }
+  gaussians = mapper_.gaussians().size();
+  cpu_seconds = thread_cpu_seconds();
+}
+
+bool MappingWorker::train_while_idle() {
+  freeze_if_due();
+  if (!mapper_.has_keyframes()) return false;
+  train(1);
+  return true;
+}
+
+void MappingWorker::train(int count) {
+  for (int i = 0; i < count && mapper_.has_keyframes(); ++i) {
+    mapper_.train({}, executor_);
+    ++iterations;
+  }
+  gaussians = mapper_.gaussians().size();
+  training_psnr = mapper_.training_psnr();
+  cpu_seconds = thread_cpu_seconds();
+}
+
+FrozenMap MappingWorker::take_online() {
+  if (!online_) online_ = mapper_.freeze();
+  return std::move(*online_);
+}
+
+}  // namespace photoslam

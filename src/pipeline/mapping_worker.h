@@ -1,0 +1,63 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <variant>
+
+#include "base/executor.h"
+#include "pipeline/frame_feed.h"
+#include "pipeline/system_options.h"
+
+namespace photoslam {
+
+/// A keyframe has entered the geometric map.
+struct MapUpdate {
+  std::shared_ptr<const MapSnapshot> map;
+  KeyframeId keyframe;
+  std::shared_ptr<const KeyframeImages> images;
+};
+
+/// By logical time: train so many iterations now.
+struct TrainingBudget {
+  int iterations = 0;
+};
+
+using MappingMessage = std::variant<MapUpdate, TrainingBudget>;
+
+/// Runs photorealistic mapping behind a message queue, freezes the map that counts as the online result, and keeps the
+/// figures that others may read at any time.
+class MappingWorker {
+ public:
+  MappingWorker(const SystemOptions& options, const RunSettings& settings, const PinholeCamera& camera,
+                double metres_per_depth_unit, ImageU8 mask, Executor& executor);
+
+  void handle(MappingMessage message);
+  /// Trains once; false when there is nothing to train on.
+  bool train_while_idle();
+  /// Freezes the online map at the first opportunity after this time.
+  void set_freeze_time(SteadyTime time) { freeze_time_ = time.time_since_epoch().count(); }
+  /// The online map; frozen now if it has not been before. Call after the stage has finished.
+  FrozenMap take_online();
+
+  PhotorealisticMapper& mapper() { return mapper_; }
+  Executor& executor() { return executor_; }
+
+  // Figures for progress and report; readable from any thread.
+  std::atomic<int> iterations{0};
+  std::atomic<size_t> gaussians{0};
+  std::atomic<double> training_psnr{0};
+  std::atomic<double> cpu_seconds{0};  ///< Of the mapping thread itself, its helpers not included.
+
+ private:
+  void train(int count);
+  void freeze_if_due();
+
+  PhotorealisticMapper mapper_;
+  Executor& executor_;
+  std::atomic<SteadyTime::rep> freeze_time_{std::numeric_limits<SteadyTime::rep>::max()};
+  std::optional<FrozenMap> online_;
+};
+
+}  // namespace photoslam

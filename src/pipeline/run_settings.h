@@ -1,0 +1,84 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/ids.h"
+#include "io/trajectory_file.h"
+#include "localization/tracker.h"
+#include "photorealistic_mapping/photorealistic_mapper.h"
+
+namespace photoslam {
+
+enum class Pace {
+  realtime,  ///< Frames are released at their timestamps; those that come too fast are dropped and counted.
+  asap,      ///< No waiting, nothing dropped.
+};
+
+/// What a run is asked to do. How well each component does it is configured in SystemOptions.
+struct RunSettings {
+  Pace pace = Pace::realtime;
+  bool deterministic = false;  ///< Logical time: the same output bytes at any thread count.
+  uint64_t seed = 1;
+  int threads = 0;            ///< For mapping; 0: one per core.
+  double refine_seconds = 0;  ///< Training after the input has ended …
+  int refine_iterations = 0;  ///< … or so many iterations.
+  int hold_out = 0;           ///< Every so many-th frame is tracked but never mapped; 0: none.
+  double map_until_s = std::numeric_limits<double>::infinity();  ///< Later frames are tracked only.
+  bool logical_time = false;  ///< Tracking waits for the mapper; set by deterministic, or to spend a fixed number of
+                              ///< iterations per frame.
+};
+
+/// What became of one input frame.
+struct FrameOutcome {
+  FrameId frame;
+  int64_t timestamp_ns = 0;
+  bool dropped = false;
+  bool held_out = false;
+  TrackingState state = TrackingState::initializing;
+  std::string reason;
+  int num_features = 0;
+  int num_inliers = 0;
+  double queue_wait_ms = 0, tracking_ms = 0, blocked_ms = 0;
+  std::optional<double> latency_ms;  ///< At real-time pace: from the due time to the published pose.
+  KeyframeId keyframe;               ///< If it became one.
+  bool has_pose = false;
+  SE3 online_camera_from_world;  ///< As published at the time.
+  KeyframeId reference;
+  SE3 camera_from_reference;  ///< The final pose follows the reference keyframe.
+};
+
+/// One point of the quality curve of the refinement.
+struct RefinementPoint {
+  double seconds = 0;
+  int iterations = 0;
+  double training_psnr_db = 0;
+  size_t gaussians = 0;
+};
+
+struct RunOutcome {
+  std::vector<FrameOutcome> frames;  ///< Every input frame, in order.
+  FrozenMap online;                  ///< When all keyframes were consumed, at most 1 s after the last frame.
+  FrozenMap final;                   ///< After refinement.
+  int iterations = 0;
+  double mapping_cpu_seconds = 0;
+  double seconds_online = 0, seconds_drain = 0, seconds_refine = 0, seconds_total = 0;
+  std::vector<RefinementPoint> refinement;
+  bool interrupted = false;  ///< Stopped from outside before the input ended.
+  std::string failure;       ///< "component: what"; empty when all went well.
+};
+
+/// Pose of a frame in a frozen map; nothing for frames without a pose or whose keyframe the map does not hold.
+std::optional<SE3> camera_from_world(const FrameOutcome& frame, const FrozenMap& map);
+
+/// Poses of all tracked frames in the final map, as published online, and of the keyframes.
+Trajectory final_trajectory(const RunOutcome& run);
+Trajectory online_trajectory(const RunOutcome& run);
+Trajectory keyframe_trajectory(const RunOutcome& run);
+
+}  // namespace photoslam

@@ -1,0 +1,282 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "pipeline/system.h"
+
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <thread>
+
+#include "base/clock.h"
+#include "pipeline/localization_worker.h"
+#include "pipeline/mapping_worker.h"
+#include "pipeline/stage.h"
+
+namespace photoslam {
+namespace {
+
+constexpr size_t kStageQueue = 16;
+constexpr auto kProgressInterval = std::chrono::milliseconds(250);
+constexpr double kOnlineGraceSeconds = 1.0;  // the online result is the map at most this long after the last frame
+
+int num_threads(const RunSettings& settings) {
+  const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  return settings.threads > 0 ? settings.threads : cores;
+}
+
+/// The running system. Frames flow feed → localization → geometry mapping → photorealistic mapping.
+///
+/// In real time each stage takes the newest state of the others. By logical time a keyframe made at frame k reaches
+/// tracking and photorealistic mapping exactly at frame k + lag, and mapping trains a fixed number of iterations per
+/// frame: what happens does not depend on how fast anything runs.
+class Session {
+ public:
+  Session(const SystemOptions& options, const RunSettings& settings, FrameSource& source, std::stop_token stop)
+      : options_(options),
+        settings_(settings),
+        num_frames_(source.info().num_frames),
+        logical_time_(settings.deterministic || settings.logical_time),
+        threaded_(!(logical_time_ && num_threads(settings) == 1)),
+        outer_stop_(std::move(stop)),
+        forward_stop_(outer_stop_, [this] { stop_.request_stop(); }),
+        failures_(stop_),
+        executor_(num_threads(settings), lower_thread_priority),
+        localization_(options, settings, source.info()),
+        geometry_(options.geometry_mapping, options.features, localization_.camera(), localization_.bf()),
+        mapping_(options, settings, localization_.camera(), source.info().metres_per_depth_unit, localization_.mask(),
+                 executor_),
+        mapping_stage_(kStageQueue, threaded_, mapping_work(), failures_),
+        geometry_stage_(kStageQueue, threaded_, geometry_work(), failures_),
+        feed_(source, logical_time_ ? Pace::asap : settings.pace, static_cast<size_t>(options.pipeline.input_queue),
+              threaded_, stop_.get_token(), failures_) {}
+
+  RunOutcome run(const std::function<void(const Progress&)>& on_progress);
+
+ private:
+  Stage<NewKeyframe>::Work geometry_work();
+  Stage<MappingMessage>::Work mapping_work();
+  void localize_all();
+  void localize(FedFrame fed);
+  void record(FrameOutcome outcome);
+  void deliver(MapUpdate update);
+  void receive_due_updates();
+  void refine(const std::function<void(const Progress&)>& on_progress);
+  Progress progress(Progress::Phase phase) const;
+
+  SystemOptions options_;
+  RunSettings settings_;
+  int num_frames_;
+  bool logical_time_;
+  bool threaded_;
+  std::stop_source stop_;
+  std::stop_token outer_stop_;
+  std::stop_callback<std::function<void()>> forward_stop_;
+  FailureReport failures_;
+  Stopwatch clock_;
+
+  ThreadPool executor_;
+  LocalizationWorker localization_;
+  GeometryMapper geometry_;
+  MappingWorker mapping_;
+
+  // Real time: the newest map. Logical time: results in order, each taken when its frame has come.
+  mutable std::mutex mutex_;
+  std::condition_variable update_arrived_;
+  std::condition_variable localization_ended_;
+  std::shared_ptr<const MapSnapshot> newest_map_;
+  std::deque<MapUpdate> updates_;
+  bool localization_done_ = false;
+  std::vector<FrameOutcome> outcomes_;
+  int num_dropped_ = 0;
+
+  // Localization thread only.
+  std::shared_ptr<const MapSnapshot> visible_map_;
+  std::deque<int> update_due_;  // logical frame numbers
+  int frame_number_ = 0;
+  int next_frame_id_ = 0;
+
+  RunOutcome outcome_;
+
+  Stage<MappingMessage> mapping_stage_;
+  Stage<NewKeyframe> geometry_stage_;
+  FrameFeed feed_;
+};
+
+Stage<NewKeyframe>::Work Session::geometry_work() {
+  const auto process = [this](NewKeyframe keyframe) {
+    const auto interrupted = [this] { return !logical_time_ && geometry_stage_.backlog() > 0; };
+    GeometryUpdate update = geometry_.process(keyframe.proposal, interrupted);
+    deliver({std::move(update.map), update.keyframe, std::move(keyframe.images)});
+  };
+  return {.name = "geometry mapping", .handle = process};
+}
+
+Stage<MappingMessage>::Work Session::mapping_work() {
+  Stage<MappingMessage>::Work work;
+  work.name = "photorealistic mapping";
+  work.handle = [this](MappingMessage message) { mapping_.handle(std::move(message)); };
+  if (!logical_time_) work.idle = [this] { return mapping_.train_while_idle(); };
+  work.on_start = lower_thread_priority;
+  return work;
+}
+
+void Session::deliver(MapUpdate update) {
+  {
+    std::lock_guard lock(mutex_);
+    newest_map_ = update.map;
+    if (logical_time_) updates_.push_back(update);
+  }
+  update_arrived_.notify_all();
+  if (!logical_time_) mapping_stage_.post(std::move(update));
+}
+
+void Session::receive_due_updates() {
+  if (!logical_time_) {
+    std::lock_guard lock(mutex_);
+    visible_map_ = newest_map_;
+    return;
+  }
+  while (!update_due_.empty() && update_due_.front() <= frame_number_) {
+    std::unique_lock lock(mutex_);
+    const auto ready = [&] { return !updates_.empty() || !failures_.text().empty(); };
+    while (!update_arrived_.wait_for(lock, kProgressInterval, ready)) {
+    }
+    if (updates_.empty()) return;
+    MapUpdate update = std::move(updates_.front());
+    updates_.pop_front();
+    update_due_.pop_front();
+    lock.unlock();
+    visible_map_ = update.map;
+    mapping_stage_.post(std::move(update));
+  }
+}
+
+void Session::localize(FedFrame fed) {
+  receive_due_updates();
+  // Frames the queue has dropped never came here.
+  for (; next_frame_id_ < fed.frame.id.value; ++next_frame_id_) {
+    FrameOutcome dropped;
+    dropped.frame = FrameId(next_frame_id_);
+    dropped.dropped = true;
+    dropped.reason = "came too fast";
+    record(std::move(dropped));
+  }
+  next_frame_id_ = fed.frame.id.value + 1;
+
+  const bool mapping_keeps_up =
+      logical_time_ || geometry_stage_.backlog() < static_cast<size_t>(options_.pipeline.keyframe_queue);
+  std::optional<NewKeyframe> keyframe;
+  record(localization_.process(std::move(fed), visible_map_, mapping_keeps_up, keyframe));
+  if (keyframe) {
+    update_due_.push_back(frame_number_ + options_.pipeline.keyframe_lag_frames);
+    geometry_stage_.post(std::move(*keyframe));
+  }
+  if (logical_time_) mapping_stage_.post(TrainingBudget{options_.pipeline.iterations_per_frame});
+  ++frame_number_;
+}
+
+void Session::localize_all() {
+  try {
+    while (auto fed = feed_.next()) localize(std::move(*fed));
+  } catch (const std::exception& e) {
+    failures_.report("localization", e.what());
+  }
+  geometry_stage_.finish();
+  frame_number_ = std::numeric_limits<int>::max();
+  receive_due_updates();
+}
+
+void Session::record(FrameOutcome outcome) {
+  std::lock_guard lock(mutex_);
+  if (outcome.dropped) ++num_dropped_;
+  outcomes_.push_back(std::move(outcome));
+}
+
+Progress Session::progress(Progress::Phase phase) const {
+  std::lock_guard lock(mutex_);
+  Progress p;
+  p.phase = phase;
+  p.frames = static_cast<int>(outcomes_.size());
+  p.num_frames = num_frames_;
+  p.frames_per_second = p.frames / std::max(clock_.seconds(), 1e-3);
+  if (!outcomes_.empty()) p.state = outcomes_.back().state;
+  p.dropped = num_dropped_;
+  p.keyframes = newest_map_ ? static_cast<int>(newest_map_->keyframes.size()) : 0;
+  p.gaussians = mapping_.gaussians;
+  p.iterations = mapping_.iterations;
+  p.training_psnr_db = mapping_.training_psnr;
+  return p;
+}
+
+void Session::refine(const std::function<void(const Progress&)>& on_progress) {
+  if (!mapping_.mapper().has_keyframes()) return;
+  const Stopwatch clock;
+  double last_report = 0;
+  for (int i = 0; !stop_.stop_requested(); ++i) {
+    const double elapsed = clock.seconds();
+    const double done = settings_.refine_iterations > 0 ? static_cast<double>(i) / settings_.refine_iterations
+                                                        : elapsed / std::max(settings_.refine_seconds, 1e-9);
+    if (done >= 1.0 || (settings_.refine_iterations == 0 && settings_.refine_seconds <= 0)) break;
+    mapping_.mapper().train(done, mapping_.executor());
+    ++mapping_.iterations;
+    mapping_.gaussians = mapping_.mapper().gaussians().size();
+    mapping_.training_psnr = mapping_.mapper().training_psnr();
+    if (elapsed - last_report < 1e-3 * static_cast<double>(kProgressInterval.count())) continue;
+    last_report = elapsed;
+    outcome_.refinement.push_back({elapsed, mapping_.iterations, mapping_.training_psnr, mapping_.gaussians});
+    Progress p = progress(Progress::Phase::refining);
+    p.refined = done;
+    if (on_progress) on_progress(p);
+  }
+  outcome_.seconds_refine = clock.seconds();
+}
+
+RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress) {
+  if (!threaded_) {
+    localize_all();
+  } else {
+    std::thread localization([this] {
+      localize_all();
+      std::lock_guard lock(mutex_);
+      localization_done_ = true;
+      localization_ended_.notify_all();
+    });
+    std::unique_lock lock(mutex_);
+    while (!localization_ended_.wait_for(lock, kProgressInterval, [&] { return localization_done_; })) {
+      lock.unlock();
+      if (on_progress) on_progress(progress(Progress::Phase::online));
+      lock.lock();
+    }
+    lock.unlock();
+    localization.join();
+  }
+  outcome_.seconds_online = clock_.seconds();
+
+  const Stopwatch drain;
+  if (!logical_time_) {
+    mapping_.set_freeze_time(std::chrono::steady_clock::now() +
+                             std::chrono::milliseconds(static_cast<int>(1e3 * kOnlineGraceSeconds)));
+  }
+  mapping_stage_.finish();
+  outcome_.online = mapping_.take_online();
+  outcome_.seconds_drain = drain.seconds();
+  refine(on_progress);
+  outcome_.final = mapping_.mapper().freeze();
+
+  outcome_.frames = std::move(outcomes_);
+  outcome_.iterations = mapping_.iterations;
+  outcome_.mapping_cpu_seconds = mapping_.cpu_seconds;
+  outcome_.seconds_total = clock_.seconds();
+  outcome_.interrupted = outer_stop_.stop_requested();
+  outcome_.failure = failures_.text();
+  return std::move(outcome_);
+}
+
+}  // namespace
+
+RunOutcome run_slam(const SystemOptions& options, const RunSettings& settings, FrameSource& source,
+                    std::stop_token stop, const std::function<void(const Progress&)>& on_progress) {
+  return Session(options, settings, source, std::move(stop)).run(on_progress);
+}
+
+}  // namespace photoslam
