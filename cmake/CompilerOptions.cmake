@@ -1,3 +1,5 @@
+# Copyright the photoslam authors.
+# SPDX-License-Identifier: Apache-2.0
 # Flags shared by every photoslam target, as the interface target photoslam_options.
 add_library(photoslam_options INTERFACE)
 target_compile_options(photoslam_options INTERFACE

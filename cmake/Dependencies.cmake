@@ -1,3 +1,5 @@
+# Copyright the photoslam authors.
+# SPDX-License-Identifier: Apache-2.0
 # Distribution packages only; nothing is fetched at build time.
 find_package(Threads REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)

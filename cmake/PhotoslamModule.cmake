@@ -1,3 +1,5 @@
+# Copyright the photoslam authors.
+# SPDX-License-Identifier: Apache-2.0
 # photoslam_module(<name> [DEPENDS <module or library>...] [PRIVATE <library>...] [TEST_DEPENDS <library>...])
 #
 # Turns src/<name> into the static library photoslam_<name> (all *.cpp but *_test.cpp and *_benchmark.cpp)

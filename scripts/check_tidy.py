@@ -1,0 +1,79 @@
+#!/usr/bin/env python3
+# Copyright the photoslam authors.
+# SPDX-License-Identifier: Apache-2.0
+"""Runs clang-tidy-19 on the C++ sources, or on those touched by the latest commits.
+
+Needs a configured build folder (compile_commands.json), not a finished build.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def compiled_sources(build):
+    commands = json.loads((build / "compile_commands.json").read_text(encoding="utf-8"))
+    return sorted({Path(command["file"]) for command in commands})
+
+
+def files_changed_since(revision):
+    command = ["git", "-C", str(ROOT), "diff", "--name-only", revision, "--", "*.cpp", "*.h"]
+    names = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
+    return {ROOT / name for name in names}
+
+
+def check(build, source):
+    command = ["clang-tidy-19", "--quiet", "-p", str(build), str(source)]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    problems = [line for line in result.stdout.splitlines() if line.strip()]
+    if result.returncode != 0 and not problems:
+        problems = result.stderr.splitlines()
+    return result.returncode, problems
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sources", nargs="*", type=Path, help="only these files")
+    parser.add_argument("--build", type=Path, default=ROOT / "build" / "release")
+    parser.add_argument("--changed-since", metavar="REVISION", help="only sources that differ from this revision")
+    parser.add_argument("--seconds", type=float, default=float("inf"), help="start no further file after this time")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    arguments = parser.parse_args()
+
+    sources = compiled_sources(arguments.build)
+    if arguments.sources:
+        wanted = {path.resolve() for path in arguments.sources}
+        sources = [source for source in sources if source in wanted]
+    if arguments.changed_since:
+        changed = files_changed_since(arguments.changed_since)
+        sources = [source for source in sources if source in changed or source.with_suffix(".h") in changed]
+
+    start = time.monotonic()
+    left_out, bad = [], []
+
+    def run(source):
+        if time.monotonic() - start > arguments.seconds:
+            left_out.append(source)
+            return
+        code, problems = check(arguments.build, source)
+        if code != 0:
+            bad.append(source)
+            print("\n".join(problems), flush=True)
+
+    with ThreadPoolExecutor(arguments.jobs) as pool:
+        list(pool.map(run, sources))
+    skipped = f", {len(left_out)} left out for lack of time" if left_out else ""
+    print(f"clang-tidy: {len(sources) - len(left_out)} files in {time.monotonic() - start:.0f} s, "
+          f"{len(bad)} with findings{skipped}")
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
