@@ -1,0 +1,120 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "photorealistic_mapping/world_export.h"
+
+#include <Eigen/Dense>
+#include <numbers>
+#include <vector>
+
+#include "splatting/formulas.h"
+
+namespace photoslam {
+namespace {
+
+using splatting::Gaussian;
+using Table = GaussianTable;
+
+constexpr int kDirections = 64;
+using Basis = Eigen::Matrix<double, kDirections, 16>;
+
+/// Directions spread evenly over the sphere (Fibonacci lattice).
+Vec3 direction(int i) {
+  const double z = 1.0 - (2.0 * i + 1.0) / kDirections;
+  const double angle = std::numbers::pi * (3.0 - std::sqrt(5.0)) * i;
+  const double r = std::sqrt(1.0 - z * z);
+  return {r * std::cos(angle), r * std::sin(angle), z};
+}
+
+/// Values of the basis functions at the lattice directions, turned by `rotation`.
+Basis basis_at_directions(const Mat3& rotation) {
+  Basis basis;
+  for (int i = 0; i < kDirections; ++i) {
+    const Vec3 d = rotation * direction(i);
+    double values[16];
+    splatting::scalar::sh_basis(splatting::kMaxShDegree, d.data(), values);
+    basis.row(i) = Eigen::Map<Eigen::Matrix<double, 1, 16>>(values);
+  }
+  return basis;
+}
+
+void write_row(const Gaussian& g, const SE3& world_from_anchor, const ShRotation& rotate_sh, std::span<float, 59> row) {
+  const Vec3 mean = world_from_anchor * Vec3(static_cast<double>(g.mean[0]), static_cast<double>(g.mean[1]),
+                                             static_cast<double>(g.mean[2]));
+  const Quat rotation =
+      world_from_anchor.rotation * Quat(static_cast<double>(g.rotation[0]), static_cast<double>(g.rotation[1]),
+                                        static_cast<double>(g.rotation[2]), static_cast<double>(g.rotation[3]));
+  float sh[splatting::kNumShCoefficients][3];
+  std::copy(&g.sh[0][0], &g.sh[0][0] + 48, &sh[0][0]);
+  rotate_sh.apply(sh);
+
+  for (size_t i = 0; i < 3; ++i) row[Table::kPosition + i] = static_cast<float>(mean[static_cast<int>(i)]);
+  for (size_t c = 0; c < 3; ++c) {
+    row[Table::kShDc + c] = sh[0][c];
+    for (size_t k = 1; k < 16; ++k) row[Table::kShRest + 15 * c + k - 1] = sh[k][c];
+  }
+  row[Table::kOpacity] = g.opacity_logit;
+  for (size_t i = 0; i < 3; ++i) row[Table::kScale + i] = g.log_scale[i];
+  row[Table::kRotation] = static_cast<float>(rotation.w());
+  for (size_t i = 0; i < 3; ++i)
+    row[Table::kRotation + 1 + i] = static_cast<float>(rotation.vec()[static_cast<int>(i)]);
+}
+
+}  // namespace
+
+ShRotation::ShRotation(const Mat3& rotation) {
+  // A turned function is a combination of basis functions of the same degree; 64 directions determine it exactly.
+  // Σ c'_k Y_k(d) = Σ c_k Y_k(Rᵀ d) for all d.
+  const Basis fixed = basis_at_directions(Mat3::Identity());
+  matrix_ = (fixed.transpose() * fixed).ldlt().solve(fixed.transpose() * basis_at_directions(rotation.transpose()));
+}
+
+void ShRotation::apply(float (&sh)[splatting::kNumShCoefficients][3]) const {
+  for (int c = 0; c < 3; ++c) {
+    Eigen::Matrix<double, 16, 1> coefficients;
+    for (int k = 0; k < 16; ++k) coefficients[k] = static_cast<double>(sh[k][c]);
+    coefficients = matrix_ * coefficients;
+    for (int k = 1; k < 16; ++k) sh[k][c] = static_cast<float>(coefficients[k]);  // the constant one stays as it is
+  }
+}
+
+GaussianTable to_world(const splatting::GaussianModel& model, std::span<const SE3> anchors_from_world) {
+  std::vector<SE3> world_from_anchors;
+  std::vector<ShRotation> rotations;
+  for (const SE3& anchor_from_world : anchors_from_world) {
+    world_from_anchors.push_back(anchor_from_world.inverse());
+    rotations.emplace_back(world_from_anchors.back().matrix3());
+  }
+  const int used = splatting::num_sh_coefficients(model.sh_degree());
+  GaussianTable table;
+  table.resize(model.size());
+  size_t row = 0;
+  model.for_each([&](size_t index) {
+    Gaussian g = model.get(index);
+    std::fill(&g.sh[0][0] + 3 * used, &g.sh[0][0] + 48, 0.0f);
+    const auto anchor = static_cast<size_t>(model.anchor(index));
+    write_row(g, world_from_anchors[anchor], rotations[anchor], table.row(row++));
+  });
+  return table;
+}
+
+splatting::GaussianModel from_world(const GaussianTable& table) {
+  std::vector<Gaussian> gaussians(table.size());
+  for (size_t i = 0; i < table.size(); ++i) {
+    const auto row = table.row(i);
+    Gaussian& g = gaussians[i];
+    for (size_t k = 0; k < 3; ++k) {
+      g.mean[k] = row[Table::kPosition + k];
+      g.log_scale[k] = row[Table::kScale + k];
+      g.sh[0][k] = row[Table::kShDc + k];
+      for (size_t b = 1; b < 16; ++b) g.sh[b][k] = row[Table::kShRest + 15 * k + b - 1];
+    }
+    for (size_t k = 0; k < 4; ++k) g.rotation[k] = row[Table::kRotation + k];
+    g.opacity_logit = row[Table::kOpacity];
+  }
+  splatting::GaussianModel model;
+  model.add(model.add_anchor(), gaussians);
+  model.sort_spatially();
+  return model;
+}
+
+}  // namespace photoslam

@@ -1,0 +1,30 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+
+#include "io/gaussian_ply.h"
+#include "math/se3.h"
+#include "splatting/model.h"
+
+namespace photoslam {
+
+/// The gaussians in the world frame, as files hold them: means, rotations and spherical harmonics leave the frames of
+/// their anchors. Coefficients beyond the model's degree are zero. anchors_from_world: [anchors].
+GaussianTable to_world(const splatting::GaussianModel& model, std::span<const SE3> anchors_from_world);
+
+/// The gaussians of a file as a model with one anchor: the world.
+splatting::GaussianModel from_world(const GaussianTable& table);
+
+/// Rotates spherical-harmonic coefficients [16][3]: the colour seen along R d afterwards is that along d before.
+class ShRotation {
+ public:
+  explicit ShRotation(const Mat3& rotation);
+  void apply(float (&sh)[splatting::kNumShCoefficients][3]) const;
+
+ private:
+  Eigen::Matrix<double, 16, 16> matrix_;
+};
+
+}  // namespace photoslam
