@@ -1,0 +1,38 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "base/executor.h"
+#include "evaluation/image_score.h"
+#include "evaluation/report_html.h"
+#include "pipeline/run_settings.h"
+#include "sources/frame.h"
+
+namespace photoslam {
+
+/// A map and the poses to look at it from.
+struct ScoringTask {
+  const splatting::GaussianModel* gaussians = nullptr;
+  std::span<const SE3> anchors_from_world;            // [anchors of gaussians]
+  std::vector<std::optional<SE3>> camera_from_world;  ///< [frames of the source] by FrameId; nothing: not scored.
+};
+
+struct MapScores {
+  std::vector<FrameScore> scores;  ///< By frame.
+  std::vector<ImagePair> pairs;    ///< Of the frames asked for.
+  double render_ms = 0;            ///< Median time of one image on one core.
+};
+
+/// Renders every frame of the source at its pose, in the undistorted camera, and compares: masked where there is no
+/// data, clamped to [0, 1], never fitted to the image. The source is read once for all tasks; frames that it cannot
+/// deliver are left out. `pair_frames` are those whose pictures are kept.
+std::vector<MapScores> score_maps(FrameSource& source, std::span<const ScoringTask> tasks,
+                                  std::span<const FrameId> pair_frames, Executor& executor);
+
+/// The render as an image; planes become interleaved, values are clamped to [0, 1].
+ImageF to_image(const splatting::RenderResult& render);
+
+}  // namespace photoslam
