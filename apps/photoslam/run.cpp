@@ -1,0 +1,165 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <memory>
+#include <thread>
+
+#include "base/file.h"
+#include "base/version.h"
+#include "commands.h"
+#include "evaluation/report_html.h"
+#include "evaluation/run_evaluation.h"
+#include "interrupt.h"
+#include "pipeline/config.h"
+#include "pipeline/system.h"
+#include "progress_line.h"
+#include "result_table.h"
+#include "run_folder.h"
+#include "sources/ground_truth.h"
+
+namespace photoslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct RunArguments {
+  fs::path dataset;
+  std::string sensor;
+  std::string format = "auto";
+  fs::path camera;
+  fs::path output = "output/run";
+  std::string pace = "realtime";
+  int iterations_per_frame = -1;
+  double map_until_s = -1;
+  RunSettings settings;
+  fs::path config;
+  std::vector<std::string> assignments;
+  bool json = false;
+  bool no_images = false;
+};
+
+Status configure(const RunArguments& arguments, SystemOptions& options, RunSettings& settings) {
+  if (!arguments.config.empty()) {
+    if (Status status = load_config(arguments.config, options); !status) return status;
+  }
+  for (const std::string& assignment : arguments.assignments) {
+    if (Status status = apply_setting(assignment, options); !status) return status;
+  }
+  settings = arguments.settings;
+  if (arguments.iterations_per_frame >= 0) {
+    options.pipeline.iterations_per_frame = arguments.iterations_per_frame;
+    settings.logical_time = true;
+  }
+  if (arguments.map_until_s >= 0) settings.map_until_s = arguments.map_until_s;
+  if (settings.deterministic || settings.logical_time || arguments.pace == "asap") settings.pace = Pace::asap;
+  if (settings.deterministic && settings.refine_seconds > 0) {
+    return error("--refine-seconds depends on the clock; with --deterministic use --refine-iterations");
+  }
+  return {};
+}
+
+void announce(const SourceInfo& info, const RunArguments& arguments) {
+  fmt::print(stderr, "{}: {} frames, {}x{}, {:.4g} Hz, format {}, RGB-D\n", info.name, info.num_frames,
+             info.camera.width, info.camera.height, info.frames_per_second, info.format);
+  for (const std::string& note : info.notes) fmt::print(stderr, "  note: {}\n", note);
+  fmt::print(stderr, "writing to {}\n", arguments.output.string());
+}
+
+/// Trajectories and map are on disk before anything is measured.
+Status save_and_evaluate(const RunArguments& arguments, const SystemOptions& options, const RunSettings& settings,
+                         const SourceInfo& info, const RunOutcome& run) {
+  const RunDescription description{
+      arguments.dataset, {arguments.format, arguments.camera}, info.camera, settings.hold_out};
+  size_t map_bytes = 0;
+  if (Status status = write_run_description(arguments.output, description); !status) return status;
+  if (Status status = write_run_results(arguments.output, run, map_bytes); !status) return status;
+
+  auto source = open_source(arguments.dataset, description.source);
+  if (!source) return source.error();
+  std::optional<Trajectory> truth;
+  if (const auto path = find_ground_truth(arguments.dataset)) {
+    auto read = read_ground_truth(*path);
+    if (read) {
+      truth = std::move(*read);
+    } else {
+      fmt::print(stderr, "  note: no trajectory error: {}\n", read.error().message);
+    }
+  }
+  const int threads = settings.threads > 0 ? settings.threads : static_cast<int>(std::thread::hardware_concurrency());
+  ThreadPool executor(std::max(1, threads));
+  fmt::print(stderr, "measuring\n");
+  HtmlReport html = evaluate_run(run, options, **source, truth, !arguments.no_images && !run.interrupted, executor);
+  html.report.map.size_mb = 1e-6 * static_cast<double>(map_bytes);
+  if (Status status = write_report(arguments.output / "report.json", html.report); !status) return status;
+  if (Status status = write_html_report(arguments.output / "report.html", html); !status) return status;
+  fmt::print("{}", arguments.json ? to_json(html.report) : result_table(html.report));
+  if (!arguments.json) fmt::print("  {:<18}{}\n", "report", (arguments.output / "report.html").string());
+  return {};
+}
+
+Status run(const RunArguments& arguments) {
+  SystemOptions options;
+  RunSettings settings;
+  if (Status status = configure(arguments, options, settings); !status) return status;
+  auto source = open_source(arguments.dataset, {arguments.format, arguments.camera});
+  if (!source) return source.error();
+  const SourceInfo info = (*source)->info();
+  if (Status status = prepare_output_folder(arguments.output); !status) return status;
+  announce(info, arguments);
+
+  InterruptGuard interrupt;
+  RunOutcome outcome;
+  {
+    ProgressLine line;
+    outcome = run_slam(options, settings, **source, interrupt.token(), [&](const Progress& p) { line.show(p); });
+  }
+  if (outcome.final.keyframes_from_world.empty()) {
+    const std::string why = outcome.frames.empty() ? "no frame was read" : outcome.frames.back().reason;
+    return error("nothing could be mapped: {}{}", why, outcome.failure.empty() ? "" : " (" + outcome.failure + ")");
+  }
+  if (Status status = save_and_evaluate(arguments, options, settings, info, outcome); !status) return status;
+  if (!outcome.failure.empty()) return error("{}; what was made so far is saved", outcome.failure);
+  return {};
+}
+
+}  // namespace
+
+void add_run(CommandLine& line) {
+  auto arguments = std::make_shared<RunArguments>();
+  CLI::App& command = line.add("run", "Track a sequence and map it photorealistically",
+                               "  photoslam run rgbd_dataset_freiburg1_desk --output output/desk\n"
+                               "  photoslam run Replica/office0 --refine-seconds 30\n"
+                               "  photoslam run my_sequence --deterministic --seed 7 --hold-out 8\n");
+  RunArguments& a = *arguments;
+  command.add_option("dataset", a.dataset, "Folder of the sequence")->required();
+  command.add_option("--sensor", a.sensor, "Sensor of the sequence: rgbd")->check(CLI::IsMember({"rgbd"}));
+  command.add_option("--format", a.format, "Layout of the sequence")->check(CLI::IsMember({"auto", "tum", "replica"}));
+  command.add_option("--camera", a.camera, "camera.yaml to use instead of the sequence's own calibration");
+  command.add_option("--output", a.output, "Folder for the results")->capture_default_str();
+  command.add_option("--pace", a.pace, "Release frames at their timestamps, or as fast as they are tracked")
+      ->check(CLI::IsMember({"realtime", "asap"}))
+      ->capture_default_str();
+  command.add_option("--refine-seconds", a.settings.refine_seconds, "Keep training so long after the last frame")
+      ->check(CLI::Range(0.0, 1e6));
+  command.add_option("--refine-iterations", a.settings.refine_iterations, "The same, counted in iterations")
+      ->check(CLI::Range(0, 100000000));
+  command.add_flag("--deterministic", a.settings.deterministic,
+                   "The same bytes in every run, at any number of threads; implies --pace asap");
+  command.add_option("--seed", a.settings.seed, "Seed of everything random")->capture_default_str();
+  command.add_option("--hold-out", a.settings.hold_out, "Track every Nth frame but never map it, to score it")
+      ->check(CLI::Range(0, 1000000));
+  command.add_option("--map-until", a.map_until_s, "Map the first T seconds, then only track [s]")
+      ->check(CLI::Range(0.0, 1e9));
+  command.add_option("--iterations-per-frame", a.iterations_per_frame,
+                     "Let tracking wait for so many training iterations per frame: best quality offline")
+      ->check(CLI::Range(0, 1000));
+  command.add_option("--threads", a.settings.threads, "Threads for mapping; 0: one per core")
+      ->check(CLI::Range(0, 1024));
+  command.add_option("--config", a.config, "Configuration file (TOML); see photoslam config");
+  command.add_option("--set", a.assignments, "Change one configuration value: key=value");
+  command.add_flag("--json", a.json, "Print the report as JSON instead of the table");
+  line.on_run(command, [arguments] { return run(*arguments); });
+}
+
+}  // namespace photoslam

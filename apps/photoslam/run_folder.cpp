@@ -1,0 +1,62 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "run_folder.h"
+
+#include <nlohmann/json.hpp>
+
+#include "base/file.h"
+#include "evaluation/run_evaluation.h"
+#include "io/gaussian_ply.h"
+
+namespace photoslam {
+
+namespace fs = std::filesystem;
+
+Status write_run_description(const fs::path& folder, const RunDescription& description) {
+  const PinholeCamera& c = description.camera;
+  const nlohmann::ordered_json json = {
+      {"dataset", fs::absolute(description.dataset).string()},
+      {"format", description.source.format},
+      {"camera_file", description.source.camera.string()},
+      {"camera",
+       {{"width", c.width}, {"height", c.height}, {"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}}},
+      {"hold_out", description.hold_out}};
+  return write_file_atomically(folder / "run.json", json.dump(2) + "\n");
+}
+
+Result<RunDescription> read_run_description(const fs::path& folder) {
+  const fs::path path = folder / "run.json";
+  const auto text = read_file(path);
+  if (!text) return error("{} is not the output folder of a run: {}", folder.string(), text.error().message);
+  try {
+    const auto json = nlohmann::json::parse(*text);
+    RunDescription description;
+    description.dataset = json.at("dataset").get<std::string>();
+    description.source.format = json.at("format").get<std::string>();
+    description.source.camera = json.at("camera_file").get<std::string>();
+    const auto& camera = json.at("camera");
+    description.camera = {camera.at("width"), camera.at("height"), camera.at("fx"),
+                          camera.at("fy"),    camera.at("cx"),     camera.at("cy")};
+    description.hold_out = json.at("hold_out");
+    return description;
+  } catch (const nlohmann::json::exception& e) {
+    return error("{}: {}", path.string(), e.what());
+  }
+}
+
+Status write_run_results(const fs::path& folder, const RunOutcome& run, size_t& map_bytes) {
+  for (const auto& [name, trajectory] : {std::pair{"trajectory.tum", final_trajectory(run)},
+                                         {"trajectory_online.tum", online_trajectory(run)},
+                                         {"keyframes.tum", keyframe_trajectory(run)}}) {
+    if (Status status = write_tum_trajectory(folder / name, trajectory); !status) return status;
+  }
+  if (Status status = write_frame_log(folder / "frames.csv", frame_log(run)); !status) return status;
+  const fs::path map = folder / "map.ply";
+  const auto written = write_gaussian_ply(map, to_world(run.final.gaussians, run.final.anchors_from_world));
+  if (!written) return written.error();
+  std::error_code ignored;
+  map_bytes = fs::file_size(map, ignored);
+  return {};
+}
+
+}  // namespace photoslam

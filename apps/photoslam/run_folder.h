@@ -1,0 +1,31 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include "base/result.h"
+#include "camera/pinhole.h"
+#include "io/trajectory_file.h"
+#include "photorealistic_mapping/world_export.h"
+#include "pipeline/run_settings.h"
+#include "sources/open_source.h"
+
+namespace photoslam {
+
+/// Where a run's input came from and with what camera its map is rendered: run.json in the run's folder.
+struct RunDescription {
+  std::filesystem::path dataset;
+  SourceOptions source;
+  PinholeCamera camera;
+  int hold_out = 0;
+};
+
+Status write_run_description(const std::filesystem::path& folder, const RunDescription& description);
+Result<RunDescription> read_run_description(const std::filesystem::path& folder);
+
+/// Writes trajectory.tum, trajectory_online.tum, keyframes.tum, frames.csv and map.ply, each atomically.
+/// Sets `map_bytes` to the size of map.ply.
+Status write_run_results(const std::filesystem::path& folder, const RunOutcome& run, size_t& map_bytes);
+
+}  // namespace photoslam
