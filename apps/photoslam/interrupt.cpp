@@ -36,7 +36,8 @@ InterruptGuard::InterruptGuard() {
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  waiter_ = std::jthread([this, signals](const std::stop_token& finished) { wait_for_signals(finished, stop_, signals); });
+  waiter_ =
+      std::jthread([this, signals](const std::stop_token& finished) { wait_for_signals(finished, stop_, signals); });
 }
 
 }  // namespace photoslam

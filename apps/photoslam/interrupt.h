@@ -7,8 +7,8 @@
 
 namespace photoslam {
 
-/// Turns Ctrl-C and SIGTERM into a stop request, so that what was made so far is saved; a second one ends the process at
-/// once. Create it before any other thread: threads inherit the blocked signals.
+/// Turns Ctrl-C and SIGTERM into a stop request, so that what was made so far is saved; a second one ends the process
+/// at once. Create it before any other thread: threads inherit the blocked signals.
 class InterruptGuard {
  public:
   InterruptGuard();

@@ -17,9 +17,12 @@ std::string describe(const Progress& p) {
   const std::string map = fmt::format("{} keyframes, {} gaussians, {} iterations, PSNR {:.1f} dB", p.keyframes,
                                       p.gaussians, p.iterations, p.training_psnr_db);
   switch (p.phase) {
-    case Progress::Phase::refining: return fmt::format("refining {:3.0f} %: {}", 100 * p.refined, map);
-    case Progress::Phase::draining: return fmt::format("finishing: {}", map);
-    case Progress::Phase::online: break;
+    case Progress::Phase::refining:
+      return fmt::format("refining {:3.0f} %: {}", 100 * p.refined, map);
+    case Progress::Phase::draining:
+      return fmt::format("finishing: {}", map);
+    case Progress::Phase::online:
+      break;
   }
   const std::string total = p.num_frames > 0 ? fmt::format("/{}", p.num_frames) : "";
   const std::string dropped = p.dropped > 0 ? fmt::format(", {} dropped", p.dropped) : "";

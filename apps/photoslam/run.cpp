@@ -36,7 +36,6 @@ struct RunArguments {
   fs::path config;
   std::vector<std::string> assignments;
   bool json = false;
-  bool no_images = false;
 };
 
 Status configure(const RunArguments& arguments, SystemOptions& options, RunSettings& settings) {
@@ -89,7 +88,7 @@ Status save_and_evaluate(const RunArguments& arguments, const SystemOptions& opt
   const int threads = settings.threads > 0 ? settings.threads : static_cast<int>(std::thread::hardware_concurrency());
   ThreadPool executor(std::max(1, threads));
   fmt::print(stderr, "measuring\n");
-  HtmlReport html = evaluate_run(run, options, **source, truth, !arguments.no_images && !run.interrupted, executor);
+  HtmlReport html = evaluate_run(run, options, **source, truth, !run.interrupted, executor);
   html.report.map.size_mb = 1e-6 * static_cast<double>(map_bytes);
   if (Status status = write_report(arguments.output / "report.json", html.report); !status) return status;
   if (Status status = write_html_report(arguments.output / "report.html", html); !status) return status;
@@ -151,8 +150,9 @@ void add_run(CommandLine& line) {
       ->check(CLI::Range(0, 1000000));
   command.add_option("--map-until", a.map_until_s, "Map the first T seconds, then only track [s]")
       ->check(CLI::Range(0.0, 1e9));
-  command.add_option("--iterations-per-frame", a.iterations_per_frame,
-                     "Let tracking wait for so many training iterations per frame: best quality offline")
+  command
+      .add_option("--iterations-per-frame", a.iterations_per_frame,
+                  "Let tracking wait for so many training iterations per frame: best quality offline")
       ->check(CLI::Range(0, 1000));
   command.add_option("--threads", a.settings.threads, "Threads for mapping; 0: one per core")
       ->check(CLI::Range(0, 1024));

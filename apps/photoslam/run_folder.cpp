@@ -18,8 +18,7 @@ Status write_run_description(const fs::path& folder, const RunDescription& descr
       {"dataset", fs::absolute(description.dataset).string()},
       {"format", description.source.format},
       {"camera_file", description.source.camera.string()},
-      {"camera",
-       {{"width", c.width}, {"height", c.height}, {"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}}},
+      {"camera", {{"width", c.width}, {"height", c.height}, {"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}}},
       {"hold_out", description.hold_out}};
   return write_file_atomically(folder / "run.json", json.dump(2) + "\n");
 }
