@@ -17,7 +17,7 @@ room := .cache/room-$(DEMO_FRAMES)
 room_sources := $(shell find src/sources/synthetic apps/photoslam/synth.cpp -name '*.h' -o -name '*.cpp' 2>/dev/null | grep -v _test)
 say = @printf '\033[1m== %s\033[0m\n' "$(1)"
 
-.PHONY: help demo test build install lint format asan tsan licences clean
+.PHONY: help demo test build install lint format asan tsan docs clean
 
 help: ## Print this list
 	@grep -hE '^[a-z ]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z ]+):.*## /  make \1\t/; s/asan tsan/asan, tsan/' | expand -t 20
@@ -70,8 +70,9 @@ asan tsan: ## Build, then run the tests with the address and undefined-behaviour
 	ninja -C build/$@ -j $(JOBS)
 	ctest --test-dir build/$@ --output-on-failure --progress -j $(JOBS)
 
-licences: build ## Write docs/licences.md: what the binary links, and under which licence
-	@scripts/list_licences.py $(photoslam) > docs/licences.md
+docs: build ## Regenerate docs/configuration.md and docs/licences.md from the program
+	@$(photoslam) config --manual > docs/configuration.md
+	scripts/list_licences.py $(photoslam) > docs/licences.md
 
 clean: ## Remove build folders, results and cached sequences
 	@rm -rf build output .cache

@@ -23,10 +23,11 @@ def compiled_sources(build):
     return sorted({Path(command["file"]) for command in commands})
 
 
-def files_changed_since(revision):
-    command = ["git", "-C", str(ROOT), "diff", "--name-only", revision, "--", "*.cpp", "*.h"]
+def files_changed_since(date):
+    """Files of the commits since that date, those of the newest commit first."""
+    command = ["git", "-C", str(ROOT), "log", f"--since={date}", "--name-only", "--format=", "--", "*.cpp", "*.h"]
     names = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
-    return {ROOT / name for name in names}
+    return list(dict.fromkeys(ROOT / name for name in names if name))
 
 
 def check(build, source):
@@ -42,7 +43,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sources", nargs="*", type=Path, help="only these files")
     parser.add_argument("--build", type=Path, default=ROOT / "build" / "release")
-    parser.add_argument("--changed-since", metavar="REVISION", help="only sources that differ from this revision")
+    parser.add_argument("--since", metavar="DATE", help="only files of the commits since then, newest first")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="start no further file after this time")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     arguments = parser.parse_args()
@@ -51,9 +52,9 @@ def main():
     if arguments.sources:
         wanted = {path.resolve() for path in arguments.sources}
         sources = [source for source in sources if source in wanted]
-    if arguments.changed_since:
-        changed = files_changed_since(arguments.changed_since)
-        sources = [source for source in sources if source in changed or source.with_suffix(".h") in changed]
+    if arguments.since:
+        changed = [path.with_suffix(".cpp") for path in files_changed_since(arguments.since)]
+        sources = [path for path in dict.fromkeys(changed) if path in set(sources)]
 
     start = time.monotonic()
     left_out, bad = [], []

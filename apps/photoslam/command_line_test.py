@@ -1,0 +1,311 @@
+#!/usr/bin/env python3
+# Copyright the photoslam authors.
+# SPDX-License-Identifier: Apache-2.0
+"""The command line from outside: bad input gives one clear error and the right exit code, and leaves nothing half done.
+
+PHOTOSLAM_BINARY is the program, PHOTOSLAM_SEQUENCE a short RGB-D sequence in the TUM layout,
+PHOTOSLAM_SOURCE_DIR the root of the source tree.
+"""
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+BINARY = os.environ["PHOTOSLAM_BINARY"]
+SEQUENCE = Path(os.environ.get("PHOTOSLAM_SEQUENCE", "no sequence"))
+SOURCE_DIR = Path(os.environ.get("PHOTOSLAM_SOURCE_DIR", Path(__file__).resolve().parents[2]))
+COMMANDS = ["run", "eval", "render", "synth", "doctor", "config"]
+FAST = ["--pace", "asap", "--set", "pipeline.iterations_per_frame=1"]
+
+
+def photoslam(*arguments, timeout=300):
+    return subprocess.run(
+        [BINARY, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, check=False
+    )
+
+
+def sha256(path):
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+class CommandLineTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp(prefix="photoslam_cli_"))
+        self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
+        self.output = self.folder / "out"
+
+    def assert_fails(self, result, code, *fragments):
+        """One error line, nothing else that looks like one, and the expected words in it."""
+        self.assertEqual(result.returncode, code, result.stderr)
+        errors = [line for line in result.stderr.splitlines() if line.startswith("photoslam: error: ")]
+        self.assertEqual(len(errors), 1, result.stderr)
+        self.assertNotIn("terminate called", result.stderr)
+        for fragment in fragments:
+            self.assertIn(str(fragment), errors[0])
+
+    def assert_nothing_written(self):
+        written = [path for path in self.output.rglob("*") if path.is_file()] if self.output.is_dir() else []
+        self.assertEqual(written, [])
+
+    def copy_of_sequence(self):
+        copy = self.folder / "sequence"
+        shutil.copytree(SEQUENCE, copy)
+        return copy
+
+
+class UsageTest(CommandLineTest):
+    def test_every_command_has_help_with_examples(self):
+        for command in COMMANDS:
+            with self.subTest(command=command):
+                result = photoslam(command, "--help")
+                self.assertEqual(result.returncode, 0)
+                self.assertIn("Examples:\n  photoslam " + command, result.stdout)
+                self.assertIn(f"  {command} ", photoslam("--help").stdout)
+
+    def test_version_names_the_build(self):
+        result = photoslam("--version")
+        self.assertEqual(result.returncode, 0)
+        self.assertRegex(result.stdout, r"^photoslam \d+\.\d+\.\d+ \(.+\)\n$")
+
+    def test_no_command(self):
+        self.assert_fails(photoslam(), 2, "no command", "--help")
+
+    def test_unknown_command(self):
+        self.assert_fails(photoslam("rnu"), 2, "unknown command 'rnu'; did you mean 'run'?")
+
+    def test_unknown_option(self):
+        self.assert_fails(photoslam("run", "somewhere", "--outptu", "x"), 2, "'--outptu'; did you mean '--output'?")
+        self.assert_fails(photoslam("doctor", "--hlp"), 2, "'--hlp'; did you mean '--help'?")
+        self.assert_fails(photoslam("--versoin"), 2, "'--versoin'; did you mean '--version'?")
+
+    def test_senseless_option_values(self):
+        for option in (["--threads", "many"], ["--pace", "slow"], ["--refine-seconds", "-1"], ["--hold-out", "x"]):
+            with self.subTest(option=option):
+                result = photoslam("run", SEQUENCE, "--output", self.output, *option)
+                self.assert_fails(result, 2, option[0])
+                self.assert_nothing_written()
+
+    def test_doctor_finds_the_machine(self):
+        result = photoslam("doctor")
+        self.assertEqual(result.returncode, 0)
+        for word in ("cores usable", "SIMD", "OpenCV", "Eigen", "cuda", "LPIPS", "write"):
+            self.assertIn(word, result.stdout)
+
+
+class ConfigTest(CommandLineTest):
+    def test_printed_configuration_loads_back(self):
+        file = self.folder / "config.toml"
+        file.write_text(photoslam("config").stdout, encoding="utf-8")
+        result = photoslam("config", "--config", file)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stdout, photoslam("config", "--defaults").stdout)
+
+    def test_settings_override_the_file(self):
+        file = self.folder / "config.toml"
+        file.write_text("[pipeline]\ninput_queue = 7\n", encoding="utf-8")
+        self.assertIn("\ninput_queue = 7\n", photoslam("config", "--config", file).stdout)
+        overridden = photoslam("config", "--config", file, "--set", "pipeline.input_queue=8").stdout
+        self.assertIn("\ninput_queue = 8\n", overridden)
+        self.assertIn("Changed from the default: pipeline.input_queue", overridden)
+
+    def test_unknown_key_in_a_file(self):
+        file = self.folder / "config.toml"
+        file.write_text("[pipeline]\ninput_queu = 7\n", encoding="utf-8")
+        for command in (["config"], ["run", SEQUENCE, "--output", self.output]):
+            result = photoslam(*command, "--config", file)
+            self.assert_fails(result, 1, f"{file}:2:1: ", "did you mean 'pipeline.input_queue'?")
+        self.assert_nothing_written()
+
+    def test_unknown_key_in_a_setting(self):
+        result = photoslam("run", SEQUENCE, "--output", self.output, "--set", "pipeline.input_queu=7")
+        self.assert_fails(result, 1, "did you mean 'pipeline.input_queue'?")
+        self.assert_nothing_written()
+
+    def test_missing_file(self):
+        self.assert_fails(photoslam("config", "--config", self.folder / "none.toml"), 1, "none.toml")
+
+    def test_manual_is_current(self):
+        manual = photoslam("config", "--manual").stdout
+        kept = (SOURCE_DIR / "docs" / "configuration.md").read_text(encoding="utf-8")
+        self.assertEqual(manual, kept, "run: make docs")
+
+
+class BadInputTest(CommandLineTest):
+    def test_missing_dataset(self):
+        result = photoslam("run", self.folder / "nowhere", "--output", self.output)
+        self.assert_fails(result, 1, self.folder / "nowhere")
+        self.assert_nothing_written()
+
+    def test_empty_folder(self):
+        empty = self.folder / "empty"
+        empty.mkdir()
+        result = photoslam("run", empty, "--output", self.output)
+        self.assert_fails(result, 1, empty)
+        self.assert_nothing_written()
+
+    def test_folder_of_text_files(self):
+        notes = self.folder / "notes"
+        notes.mkdir()
+        for name in ("readme.txt", "list.txt", "rgb.md"):
+            (notes / name).write_text("some words\n", encoding="utf-8")
+        result = photoslam("run", notes, "--output", self.output)
+        self.assert_fails(result, 1, notes)
+        self.assert_nothing_written()
+
+    def test_unparsable_list(self):
+        sequence = self.copy_of_sequence()
+        (sequence / "rgb.txt").write_text("# images\n0.0 rgb/a.png\nnonsense\n", encoding="utf-8")
+        result = photoslam("run", sequence, "--output", self.output)
+        self.assert_fails(result, 1, "rgb.txt:3")
+        self.assert_nothing_written()
+
+    def test_output_that_cannot_be_written(self):
+        # Permission bits do not bind root; a folder below a regular file cannot exist for anyone.
+        file = self.folder / "file"
+        file.write_text("not a folder\n", encoding="utf-8")
+        for command in (["run", SEQUENCE], ["synth", "room", "--frames", "2"]):
+            with self.subTest(command=command[0]):
+                self.assert_fails(photoslam(*command, "--output", file / "out"), 1, file)
+        self.assertEqual(file.read_text(encoding="utf-8"), "not a folder\n")
+
+    @unittest.skipIf(os.geteuid() == 0, "root may write everywhere")
+    def test_read_only_output_folder(self):
+        self.output.mkdir(mode=0o555)
+        self.assert_fails(photoslam("run", SEQUENCE, "--output", self.output), 1, self.output)
+
+    def test_eval_of_something_else(self):
+        self.assert_fails(photoslam("eval", self.folder), 1, self.folder)
+        self.assert_fails(photoslam("eval", self.folder / "nowhere"), 1, "nowhere")
+
+    def test_render_of_something_else(self):
+        broken = self.folder / "map.ply"
+        broken.write_bytes(b"ply\nformat ascii 1.0\nend_header\n")
+        result = photoslam("render", broken, "--orbit", "--output", self.output)
+        self.assert_fails(result, 1, broken)
+        self.assert_nothing_written()
+
+    def test_unknown_scene(self):
+        result = photoslam("synth", "castle", "--output", self.output)
+        self.assertNotEqual(result.returncode, 0)
+        self.assertIn("castle", result.stderr)
+        self.assert_nothing_written()
+
+
+class DamagedSequenceTest(CommandLineTest):
+    """Bad frames are counted and skipped; the rest of the run is not disturbed."""
+
+    def run_damaged(self, sequence, damaged):
+        result = photoslam("run", sequence, "--output", self.output, *FAST)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        report = json.loads((self.output / "report.json").read_text(encoding="utf-8"))
+        frames = report["frames"]
+        self.assertEqual(frames["total"], frames["tracked"] + frames["lost"] + frames["dropped"])
+        self.assertEqual(frames["lost"], damaged)
+        return (self.output / "frames.csv").read_text(encoding="utf-8")
+
+    def test_half_written_image(self):
+        sequence = self.copy_of_sequence()
+        image = sorted((sequence / "rgb").iterdir())[4]
+        image.write_bytes(image.read_bytes()[: image.stat().st_size // 2])
+        self.assertIn(image.name, self.run_damaged(sequence, 1))
+
+    def test_empty_depth_file(self):
+        sequence = self.copy_of_sequence()
+        image = sorted((sequence / "depth").iterdir())[5]
+        image.write_bytes(b"")
+        self.assertIn(image.name, self.run_damaged(sequence, 1))
+
+    def test_all_images_damaged(self):
+        sequence = self.copy_of_sequence()
+        for image in (sequence / "rgb").iterdir():
+            image.write_bytes(b"")
+        result = photoslam("run", sequence, "--output", self.output, *FAST)
+        self.assert_fails(result, 1)
+        self.assertFalse((self.output / "map.ply").exists())
+
+
+class RunTest(CommandLineTest):
+    def run_deterministic(self, name, *options, sequence=SEQUENCE):
+        output = self.folder / name
+        result = photoslam("run", sequence, "--output", output, "--deterministic", *options)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return output
+
+    def test_report_keeps_its_contract(self):
+        output = self.run_deterministic("run")
+        report = json.loads((output / "report.json").read_text(encoding="utf-8"))
+        image = ["psnr_db", "psnr_p5_db", "ssim", "lpips", "frames"]
+        ate = ["rmse_m", "std_m", "median_m", "rot_rmse_deg", "scale", "matched"]
+        contract = {
+            "frames": ["total", "tracked", "lost", "lost_before_init", "dropped"],
+            "tracking": ["fps", "p50_ms", "p99_ms", "mean_ms", "min_ms", "max_ms", "std_ms", "blocked_p99_ms",
+                         "active_feature_ratio"],
+            "latency": ["p50_ms", "p99_ms", "max_ms"],
+            "mapping": ["iterations", "ms_per_iteration", "gaussians", "keyframes", "cpu_seconds", "seconds_online",
+                        "seconds_drain", "seconds_refine"],
+            "ate": ate, "ate_online": ate, "rpe": ["trans_m", "rot_deg"],
+            "image_online": image, "image": image, "image_keyframes": image, "image_held_out": image,
+            "render": ["fps"], "memory": ["peak_rss_mb", "gpu_mb"], "map": ["size_mb"],
+            "loops": ["closed", "reconnected"], "config": ["all", "changed"],
+        }
+        for group, keys in contract.items():
+            for key in keys:
+                self.assertIn(key, report[group], group)
+        for key in ("seconds_total", "machine", "version"):
+            self.assertIn(key, report)
+        self.assertEqual(len(report["config"]["changed"]), 0)
+        self.assertIsNone(report["image"]["lpips"])
+        self.assertIsNone(report["latency"]["p50_ms"])  # no due times without real-time pace
+        for name in ("trajectory.tum", "trajectory_online.tum", "keyframes.tum", "frames.csv", "map.ply",
+                     "report.html"):
+            self.assertTrue((output / name).is_file(), name)
+        self.assertEqual([path.name for path in output.iterdir() if "tmp" in path.name], [])
+
+    def test_deterministic_at_any_thread_count_and_without_truth(self):
+        blind = self.copy_of_sequence()
+        (blind / "groundtruth.txt").unlink()
+        first = self.run_deterministic("one", "--threads", "1")
+        second = self.run_deterministic("two", "--threads", "2", sequence=blind)
+        for name in ("trajectory.tum", "keyframes.tum", "map.ply"):
+            self.assertEqual(sha256(first / name), sha256(second / name), name)
+        report = json.loads((second / "report.json").read_text(encoding="utf-8"))
+        self.assertIsNone(report["ate"]["rmse_m"])
+
+    def test_eval_repeats_the_figures_of_the_run(self):
+        output = self.run_deterministic("run")
+        before = json.loads((output / "report.json").read_text(encoding="utf-8"))
+        result = photoslam("eval", output, "--truth", SEQUENCE)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        after = json.loads((output / "report.json").read_text(encoding="utf-8"))
+        self.assertAlmostEqual(before["ate"]["rmse_m"], after["ate"]["rmse_m"], places=9)
+
+    def test_interrupted_run_saves_what_it_has(self):
+        command = [BINARY, "run", str(SEQUENCE), "--output", str(self.output), "--refine-seconds", "120"]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(4.0)
+        process.send_signal(signal.SIGINT)
+        process.wait(timeout=60)
+        self.assertGreaterEqual(process.returncode, 0, "ended by the signal instead of saving")
+        self.assertTrue((self.output / "trajectory.tum").is_file())
+        self.assertTrue((self.output / "map.ply").is_file())
+
+    def test_killed_run_leaves_no_partial_file(self):
+        command = [BINARY, "run", str(SEQUENCE), "--output", str(self.output), "--refine-seconds", "120"]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(2.0)
+        process.kill()
+        process.wait()
+        for name in ("map.ply", "trajectory.tum", "report.json"):
+            self.assertFalse((self.output / name).exists(), name)
+
+
+if __name__ == "__main__":
+    unittest.main()
