@@ -88,6 +88,7 @@ class ProjectionMatcher {
   std::vector<int> query_of_keypoint_;
   std::vector<int> distance_of_keypoint_;
   std::vector<float> rotations_;
+  std::vector<uint8_t> keep_;
 };
 
 /// Matches two sets of features without knowing where to look: best by Hamming distance, ratio test, mutual, rotation
