@@ -1,0 +1,107 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "sources/image_list_source.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "io/image_file.h"
+
+namespace photoslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+class ImageListSource final : public FrameSource {
+ public:
+  ImageListSource(SourceInfo info, std::vector<ListedFrame> frames)
+      : info_(std::move(info)), frames_(std::move(frames)) {}
+
+  const SourceInfo& info() const override { return info_; }
+
+  std::optional<Frame> next() override {
+    if (next_ == frames_.size()) return std::nullopt;
+    const ListedFrame& listed = frames_[next_];
+    Frame frame;
+    frame.id = FrameId(static_cast<int32_t>(next_++));
+    frame.timestamp_ns = listed.timestamp_ns;
+    frame.defect = load(read_image(listed.color), listed.color, frame.color);
+    if (frame.defect.empty()) frame.defect = load(read_depth_png(listed.depth), listed.depth, frame.depth);
+    return frame;
+  }
+
+ private:
+  /// Moves the image into `target` and returns what is wrong with it, if anything.
+  template <class T>
+  std::string load(Result<Image<T>> image, const fs::path& path, Image<T>& target) const {
+    if (!image) return image.error().message;
+    const PinholeCamera& camera = info_.camera;
+    if (image->width() != camera.width || image->height() != camera.height) {
+      return fmt::format("{} has {}x{} pixels, expected {}x{}", path.string(), image->width(), image->height(),
+                         camera.width, camera.height);
+    }
+    target = std::move(*image);
+    return {};
+  }
+
+  SourceInfo info_;
+  std::vector<ListedFrame> frames_;
+  size_t next_ = 0;
+};
+
+std::vector<fs::path> missing_files(const std::vector<ListedFrame>& frames, size_t& complete_frames) {
+  std::vector<fs::path> missing;
+  for (const ListedFrame& frame : frames) {
+    const size_t before = missing.size();
+    for (const fs::path& path : {frame.color, frame.depth}) {
+      std::error_code ignored;
+      if (!fs::exists(path, ignored)) missing.push_back(path);
+    }
+    complete_frames += missing.size() == before ? 1 : 0;
+  }
+  return missing;
+}
+
+/// "a, b, c and 12 more".
+std::string name_some(const std::vector<fs::path>& paths) {
+  constexpr size_t kNamed = 3;
+  std::string text;
+  for (size_t i = 0; i < std::min(kNamed, paths.size()); ++i) text += (i == 0 ? "" : ", ") + paths[i].string();
+  return paths.size() > kNamed ? fmt::format("{} and {} more", text, paths.size() - kNamed) : text;
+}
+
+/// Compares the first readable colour image with the camera: a wrong calibration file is better refused than found out.
+Status check_image_size(const SourceInfo& info, const std::vector<ListedFrame>& frames) {
+  constexpr size_t kTried = 5;
+  for (size_t i = 0; i < std::min(kTried, frames.size()); ++i) {
+    const Result<ImageU8> image = read_image(frames[i].color);
+    if (!image) continue;
+    if (image->width() == info.camera.width && image->height() == info.camera.height) return {};
+    return error("{} has {}x{} pixels, but the camera of {} is calibrated for {}x{}", frames[i].color.string(),
+                 image->width(), image->height(), info.name, info.camera.width, info.camera.height);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<FrameSource>> make_image_list_source(SourceInfo info, std::vector<ListedFrame> frames) {
+  for (size_t i = 1; i < frames.size(); ++i) {
+    PHOTOSLAM_CHECK(frames[i - 1].timestamp_ns < frames[i].timestamp_ns, "frame {}", i);
+  }
+  size_t complete = 0;
+  const std::vector<fs::path> missing = missing_files(frames, complete);
+  if (complete * 10 < frames.size() || complete == 0) {
+    return error("{}: of {} listed frames only {} have their files; missing: {}", info.name, frames.size(), complete,
+                 name_some(missing));
+  }
+  if (!missing.empty()) {
+    info.notes.push_back(fmt::format("{} of {} listed frames lack a file and count as lost: {}",
+                                     frames.size() - complete, frames.size(), name_some(missing)));
+  }
+  if (const Status status = check_image_size(info, frames); !status) return status.error();
+  info.num_frames = static_cast<int>(frames.size());
+  return std::unique_ptr<FrameSource>(std::make_unique<ImageListSource>(std::move(info), std::move(frames)));
+}
+
+}  // namespace photoslam
