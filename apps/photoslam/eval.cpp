@@ -1,0 +1,106 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <map>
+#include <memory>
+#include <thread>
+
+#include "commands.h"
+#include "evaluation/map_scoring.h"
+#include "evaluation/run_evaluation.h"
+#include "result_table.h"
+#include "run_folder.h"
+#include "sources/ground_truth.h"
+
+namespace photoslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct EvalArguments {
+  fs::path folder;
+  fs::path truth;
+  std::string frames = "all";
+  bool json = false;
+};
+
+/// Whether a frame of the log is among those asked for.
+bool is_chosen(const FrameRecord& frame, const std::string& which, int hold_out) {
+  if (which == "keyframes") return frame.keyframe.valid();
+  if (which == "held-out") return hold_out > 0 && frame.frame.value % hold_out == hold_out - 1;
+  return true;
+}
+
+Result<std::vector<FrameScore>> score_run(const EvalArguments& arguments, const RunDescription& description,
+                                          const FrameLog& log, const Trajectory& trajectory) {
+  auto source = open_source(description.dataset, description.source);
+  if (!source) return source.error();
+  const auto table = read_gaussian_ply(arguments.folder / "map.ply");
+  if (!table) return table.error();
+  const splatting::GaussianModel model = from_world(*table);
+  const std::vector<SE3> world = {SE3{}};
+
+  std::map<int64_t, SE3> pose_at;
+  for (const StampedPose& pose : trajectory) pose_at[pose.timestamp_ns] = pose.world_from_camera.inverse();
+  ScoringTask task{&model, world, {}};
+  for (const FrameRecord& frame : log) {
+    const auto pose = pose_at.find(frame.timestamp_ns);
+    if (pose == pose_at.end() || !is_chosen(frame, arguments.frames, description.hold_out)) continue;
+    const auto id = static_cast<size_t>(frame.frame.value);
+    if (task.camera_from_world.size() <= id) task.camera_from_world.resize(id + 1);
+    task.camera_from_world[id] = pose->second;
+  }
+  ThreadPool executor(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
+  return score_maps(**source, std::span(&task, 1), {}, executor).front().scores;
+}
+
+Status eval(const EvalArguments& arguments) {
+  const auto description = read_run_description(arguments.folder);
+  if (!description) return description.error();
+  auto report = read_report(arguments.folder / "report.json");
+  if (!report) return report.error();
+  const auto estimate = read_tum_trajectory(arguments.folder / "trajectory.tum");
+  if (!estimate) return estimate.error();
+  const auto online = read_tum_trajectory(arguments.folder / "trajectory_online.tum");
+  if (!online) return online.error();
+  const auto log = read_frame_log(arguments.folder / "frames.csv");
+  if (!log) return log.error();
+
+  HtmlReport html;
+  html.report = std::move(*report);
+  const auto found = arguments.truth.empty() ? find_ground_truth(description->dataset) : std::optional(arguments.truth);
+  if (found) {
+    const auto truth = read_ground_truth(*found);
+    if (!truth) return truth.error();
+    evaluate_trajectories(*estimate, *online, *truth, false, html);
+    if (!html.report.ate.rmse_m) {
+      return error("{}: fewer than three poses within 20 ms of those of {}", found->string(),
+                   (arguments.folder / "trajectory.tum").string());
+    }
+  }
+  const auto scores = score_run(arguments, *description, *log, *estimate);
+  if (!scores) return scores.error();
+  if (scores->empty()) return error("{}: no frames to score among '{}'", arguments.folder.string(), arguments.frames);
+  html.report.image = summarize(*scores);
+  fmt::print("{}", arguments.json ? to_json(html.report) : result_table(html.report));
+  return {};
+}
+
+}  // namespace
+
+void add_eval(CommandLine& line) {
+  auto arguments = std::make_shared<EvalArguments>();
+  CLI::App& command = line.add("eval", "Measure a finished run again: trajectory and images",
+                               "  photoslam eval output/desk\n"
+                               "  photoslam eval output/desk --truth groundtruth.txt --frames keyframes\n");
+  command.add_option("run", arguments->folder, "Output folder of a run")->required();
+  command.add_option("--truth", arguments->truth, "True trajectory: a file or a sequence folder");
+  command.add_option("--frames", arguments->frames, "Frames whose images are scored")
+      ->check(CLI::IsMember({"all", "keyframes", "held-out"}))
+      ->capture_default_str();
+  command.add_flag("--json", arguments->json, "Print JSON instead of the table");
+  line.on_run(command, [arguments] { return eval(*arguments); });
+}
+
+}  // namespace photoslam

@@ -1,0 +1,153 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <numbers>
+#include <thread>
+
+#include "base/clock.h"
+#include "base/file.h"
+#include "commands.h"
+#include "evaluation/map_scoring.h"
+#include "image/convert.h"
+#include "io/gaussian_ply.h"
+#include "io/image_file.h"
+#include "io/npy_file.h"
+#include "photorealistic_mapping/view_geometry.h"
+#include "run_folder.h"
+#include "sources/camera_file.h"
+#include "sources/posed_cameras.h"
+
+namespace photoslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct RenderArguments {
+  fs::path map;
+  fs::path cameras;
+  fs::path trajectory;
+  fs::path camera;
+  bool orbit = false;
+  int orbit_frames = 120;
+  fs::path output = "output/render";
+  std::string format = "png";
+};
+
+/// A horizontal circle around the middle of the map, looking inwards.
+std::vector<SE3> orbit(const GaussianTable& map, int num_frames) {
+  const auto quantile = [&](size_t axis, double share) {
+    std::vector<double> values;
+    for (size_t i = 0; i < map.size(); ++i) values.push_back(static_cast<double>(map.row(i)[axis]));
+    const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
+  };
+  const Vec3 center(quantile(0, 0.5), quantile(1, 0.5), quantile(2, 0.5));
+  const double extent = std::max(quantile(0, 0.9) - quantile(0, 0.1), quantile(2, 0.9) - quantile(2, 0.1));
+  std::vector<SE3> poses;
+  for (int i = 0; i < num_frames; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / num_frames;
+    const Vec3 position = center + 0.5 * extent * Vec3(std::sin(angle), -0.3, -std::cos(angle));
+    const Vec3 forward = (center - position).normalized();
+    const Vec3 right = Vec3::UnitY().cross(forward).normalized();  // the world's y points down
+    Mat3 world_from_camera;
+    world_from_camera << right, forward.cross(right), forward;
+    poses.push_back(SE3(Quat(world_from_camera), position).inverse());
+  }
+  return poses;
+}
+
+/// The calibration to render with: --camera, else that of the run.
+Result<PinholeCamera> choose_camera(const RenderArguments& arguments) {
+  if (!arguments.camera.empty()) {
+    const auto file = read_camera_yaml(arguments.camera);
+    if (!file) return file.error();
+    return file->camera;
+  }
+  if (fs::is_directory(arguments.map)) {
+    const auto description = read_run_description(arguments.map);
+    if (!description) return description.error();
+    return description->camera;
+  }
+  return error("--trajectory and --orbit of a map file need --camera camera.yaml");
+}
+
+Result<std::vector<PosedCamera>> choose_views(const RenderArguments& arguments, const GaussianTable& map) {
+  if (!arguments.cameras.empty()) return read_transforms_json(arguments.cameras);
+  const auto camera = choose_camera(arguments);
+  if (!camera) return camera.error();
+  std::vector<PosedCamera> views;
+  if (arguments.orbit) {
+    for (const SE3& pose : orbit(map, arguments.orbit_frames)) views.push_back({*camera, pose, {}});
+    return views;
+  }
+  const auto trajectory = read_tum_trajectory(arguments.trajectory);
+  if (!trajectory) return trajectory.error();
+  for (const StampedPose& pose : *trajectory) views.push_back({*camera, pose.world_from_camera.inverse(), {}});
+  return views;
+}
+
+Status write_view(const RenderArguments& arguments, size_t index, const splatting::RenderResult& render) {
+  const ImageF image = to_image(render);
+  const fs::path path = arguments.output / fmt::format("{:06}.{}", index, arguments.format);
+  return arguments.format == "npy" ? write_npy(path, image) : write_png(path, to_u8(image));
+}
+
+Status render(const RenderArguments& arguments) {
+  const int chosen = !arguments.cameras.empty() + !arguments.trajectory.empty() + arguments.orbit;
+  if (chosen != 1) throw CLI::ValidationError("give one of --cameras, --trajectory and --orbit");
+  const auto map = read_gaussian_ply(fs::is_directory(arguments.map) ? arguments.map / "map.ply" : arguments.map);
+  if (!map) return map.error();
+  const auto views = choose_views(arguments, *map);
+  if (!views) return views.error();
+  if (Status status = prepare_output_folder(arguments.output); !status) return status;
+
+  const splatting::GaussianModel model = from_world(*map);
+  const std::vector<SE3> world = {SE3{}};
+  ThreadPool executor(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
+  splatting::Renderer renderer;
+  splatting::RenderResult result;
+  std::vector<splatting::Pose> camera_from_anchor;
+  double render_ms = 0;
+  for (size_t i = 0; i < views->size(); ++i) {
+    const PosedCamera& view = (*views)[i];
+    camera_from_anchors(view.camera_from_world, world, camera_from_anchor);
+    const Stopwatch clock;
+    renderer.render(model, {to_splatting(view.camera), camera_from_anchor}, {}, executor, result);
+    render_ms += clock.milliseconds();
+    if (Status status = write_view(arguments, i, result); !status) return status;
+  }
+  fmt::print("{} images of {} gaussians in {}, {:.1f} ms each to render\n", views->size(), map->size(),
+             arguments.output.string(), render_ms / static_cast<double>(views->size()));
+  return {};
+}
+
+}  // namespace
+
+void add_render(CommandLine& line) {
+  auto arguments = std::make_shared<RenderArguments>();
+  CLI::App& command =
+      line.add("render", "Draw a map from any views",
+               "  photoslam render output/desk --orbit --output orbit\n"
+               "  photoslam render output/desk --trajectory output/desk/trajectory.tum --output frames\n"
+               "  photoslam render map.ply --cameras transforms.json --format npy --output views\n");
+  RenderArguments& a = *arguments;
+  command.add_option("map", a.map, "map.ply, or the output folder of a run")->required();
+  command.add_option("--cameras", a.cameras, "Cameras to draw from: transforms.json");
+  command.add_option("--trajectory", a.trajectory, "Poses to draw from: TUM lines");
+  command.add_option("--camera", a.camera, "camera.yaml for --trajectory and --orbit; default: that of the run");
+  command.add_flag("--orbit", a.orbit, "Circle around the middle of the map");
+  command.add_option("--orbit-frames", a.orbit_frames, "Images of the orbit")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command.add_option("--output", a.output, "Folder for the images")->capture_default_str();
+  command.add_option("--format", a.format, "png: 8-bit; npy: float32 [height, width, 3]")
+      ->check(CLI::IsMember({"png", "npy"}))
+      ->capture_default_str();
+  line.on_run(command, [arguments] { return render(*arguments); });
+}
+
+}  // namespace photoslam
