@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/executor.h"
+#include "splatting/cpu/buffer.h"
 #include "splatting/target_image.h"
 
 namespace photoslam::splatting {
@@ -33,8 +34,7 @@ class LossFunction {
                            const Exposure& exposure, Executor& executor, std::vector<float>& dl_drgb);
 
  private:
-  std::vector<float> scratch_;  // one slice per worker
-  std::vector<double> sums_;    // one slice per task: added in order
+  Buffer<float> scratch_;  // one slice per worker
 };
 
 /// Depth loss: mean over pixels with depth d of |D − A d|, D = Σ w z and A = Σ w as rendered (= |Σ w (z − d)|).

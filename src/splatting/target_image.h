@@ -22,13 +22,13 @@ class TargetImage {
 
   int width() const { return width_; }
   int height() const { return height_; }
-  bool empty() const { return rgb_.empty(); }
+  bool empty() const { return planes_.empty(); }
   bool has_mask() const { return !mask_.empty(); }
   bool has_depth() const { return !depth_.empty(); }
 
-  std::span<const uint8_t> rgb() const { return rgb_; }       // [H, W, 3]
-  std::span<const uint8_t> mask() const { return mask_; }     // [H, W] or empty
-  std::span<const uint16_t> depth() const { return depth_; }  // [H, W] or empty
+  std::span<const uint8_t> planes() const { return planes_; }  // [3, H, W]
+  std::span<const uint8_t> mask() const { return mask_; }      // [H, W] or empty
+  std::span<const uint16_t> depth() const { return depth_; }   // [H, W] or empty
   float depth_unit() const { return depth_unit_; }
 
   /// Number of pixels with data, and of those with depth.
@@ -37,7 +37,7 @@ class TargetImage {
 
  private:
   int width_ = 0, height_ = 0;
-  std::vector<uint8_t> rgb_;
+  std::vector<uint8_t> planes_;
   std::vector<uint8_t> mask_;
   std::vector<uint16_t> depth_;
   float depth_unit_ = 0;

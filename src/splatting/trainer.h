@@ -76,11 +76,10 @@ class Trainer {
   /// Renders (see rendered()) without touching the model; a call of backward() may follow.
   void forward(const GaussianModel& model, const View& view, const RenderOptions& options, Executor& executor);
 
-  /// Gradients of a scalar L given dL/drgb [3, H, W], dL/ddepth and dL/dalpha [H, W] (empty = zero), for the model
-  /// and view of the preceding forward(), which must not have changed.
-  void backward(const GaussianModel& model, const View& view, const RenderOptions& options,
-                std::span<const float> dl_drgb, std::span<const float> dl_ddepth, std::span<const float> dl_dalpha,
-                Executor& executor, Gradients& gradients);
+  /// Gradients of a scalar L given dL/drgb [3, H, W], dL/ddepth and dL/dalpha [H, W] (empty = zero), for the view
+  /// of the preceding forward() and its model, which must not have changed.
+  void backward(const GaussianModel& model, std::span<const float> dl_drgb, std::span<const float> dl_ddepth,
+                std::span<const float> dl_dalpha, Executor& executor, Gradients& gradients);
 
   /// The image of the last step() or forward(), as rendered before the update and before any exposure.
   const RenderResult& rendered() const;

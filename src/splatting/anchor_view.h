@@ -1,0 +1,18 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+namespace photoslam::splatting {
+
+/// A camera as seen from one anchor. The centre is split in two floats, so that subtracting it from a mean is exact to
+/// fp32 of the difference, however far from the anchor's origin both are.
+struct AnchorView {
+  float rotation[9];    ///< camera_from_anchor, row-major.
+  float center[3];      ///< Camera centre in the anchor frame, rounded …
+  float center_low[3];  ///< … and what rounding lost.
+  float fx, fy, cx, cy;
+  float min_x, max_x, min_y, max_y;  ///< Clamp of x/z and y/z in the Jacobian.
+  float near;
+};
+
+}  // namespace photoslam::splatting

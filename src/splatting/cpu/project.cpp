@@ -1,0 +1,239 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "splatting/cpu/project.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "base/check.h"
+#include "splatting/cpu/targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "splatting/cpu/project.cpp"
+#include "hwy/foreach_target.h"
+#include "hwy/highway.h"
+#include "splatting/cpu/lanes-inl.h"
+#include "splatting/formulas.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace photoslam::splatting::HWY_NAMESPACE {
+
+/// Anything beyond this is taken for garbage and not drawn.
+inline constexpr float kAbsurd = 1e18f;
+
+HWY_INLINE void colors(const Block& block, const Lanes* offset, int degree, size_t lane, Lanes* rgb) {
+  Lanes direction[3], basis[kNumShCoefficients];
+  normalize(offset, direction);
+  sh_basis(degree, direction, basis);
+  for (int c = 0; c < 3; ++c) rgb[c] = Lanes(0.5f);
+  for (int k = 0; k < num_sh_coefficients(degree); ++k)
+    for (int c = 0; c < 3; ++c) rgb[c] = mul_add(basis[k], load(block.parameters[row::kSh + 3 * k + c] + lane), rgb[c]);
+  for (int c = 0; c < 3; ++c)
+    rgb[c] = select(rgb[c] > Lanes(0.0f), rgb[c], select(rgb[c] <= Lanes(0.0f), Lanes(0.0f), rgb[c]));
+}
+
+/// Projects one block into `splats` [64]; returns the lanes whose ellipse may touch a pixel. Not-a-number fails every
+/// comparison, so garbage never passes.
+uint64_t project_block(const Block& block, const AnchorView& view, int width, int height, int degree, Splat* splats) {
+  alignas(64) float rows[15][kBlockSize];
+  uint64_t visible = 0;
+  for (size_t lane = 0; lane < static_cast<size_t>(block.count); lane += kLanes) {
+    Lanes mean[3], rotation[4], log_scale[3], rgb[3];
+    for (int i = 0; i < 3; ++i) mean[i] = load(block.parameters[row::kMean + i] + lane);
+    for (int i = 0; i < 4; ++i) rotation[i] = load(block.parameters[row::kRotation + i] + lane);
+    for (int i = 0; i < 3; ++i) log_scale[i] = load(block.parameters[row::kLogScale + i] + lane);
+    Projection<Lanes> g;
+    project(view, mean, rotation, log_scale, g);
+
+    const Lanes logit = load(block.parameters[row::kOpacity] + lane);
+    const Lanes log2_opacity = -logarithm2(Lanes(1.0f) + exponential(minimum(-logit, Lanes(80.0f))));
+    const Lanes cut = log2_opacity + Lanes(kLog2Cut);
+    const Lanes radius2 = cut * Lanes(2.0f * 0.6931471805599453f);
+    const Lanes extent_x = square_root(radius2 * g.a), extent_y = square_root(radius2 * g.c);
+    const Lanes inv_c = Lanes(1.0f) / g.c, inv_det = Lanes(1.0f) / g.det;
+    const Lanes half_log2e(0.5f * 1.4426950408889634f);
+
+    const Lanes zero(0.0f), absurd(kAbsurd);
+    LaneMask ok = (g.p[2] > Lanes(view.near)) & (g.p[2] < absurd) & (cut > zero) & (g.a < absurd) & (g.c < absurd) &
+                  (g.det > zero) & (inv_det > zero) & (g.u + extent_x >= zero) & (g.v + extent_y >= zero) &
+                  (g.u - extent_x <= Lanes(static_cast<float>(width - 1))) &
+                  (g.v - extent_y <= Lanes(static_cast<float>(height - 1)));
+    const size_t left = static_cast<size_t>(block.count) - lane;
+    ok = ok & LaneMask{hn::FirstN(kFloats, std::min(left, kLanes))};
+    if (hn::AllFalse(kFloats, ok.m)) continue;
+    colors(block, g.offset, degree, lane, rgb);
+    ok = ok & (rgb[0] < absurd) & (rgb[1] < absurd) & (rgb[2] < absurd);
+
+    store(g.u, rows[0] + lane);
+    store(g.v, rows[1] + lane);
+    store(g.b * inv_c, rows[2] + lane);
+    store(-half_log2e * g.c * inv_det, rows[3] + lane);
+    store(-half_log2e * inv_c, rows[4] + lane);
+    store(log2_opacity, rows[5] + lane);
+    for (size_t c = 0; c < 3; ++c) store(rgb[c], rows[6 + c] + lane);
+    store(g.p[2], rows[9] + lane);
+    store(cut, rows[10] + lane);
+    store(g.det * inv_c / half_log2e, rows[11] + lane);
+    store(g.b * extent_x / g.a, rows[12] + lane);
+    store(extent_x, rows[13] + lane);
+    store(extent_y, rows[14] + lane);
+    uint8_t bits[8] = {};
+    hn::StoreMaskBits(kFloats, ok.m, bits);
+    visible |= static_cast<uint64_t>(bits[0] | (bits[1] << 8)) << lane;
+  }
+  for (uint64_t rest = visible; rest != 0; rest &= rest - 1) {
+    const int lane = std::countr_zero(rest);
+    float* splat = &splats[lane].u;
+    for (int i = 0; i < 15; ++i) splat[i] = rows[i][lane];
+  }
+  return visible;
+}
+
+}  // namespace photoslam::splatting::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace photoslam::splatting {
+namespace {
+
+HWY_EXPORT(project_block);
+
+AnchorView make_anchor_view(const Pose& pose, const Camera& camera, float near) {
+  AnchorView view{};
+  const double* r = pose.rotation;
+  const double* t = pose.translation;
+  // Centre = −R⁻¹ t by the adjugate: exact for the rotation as given, even if rounded to float.
+  const double adjugate[9] = {r[4] * r[8] - r[5] * r[7], r[2] * r[7] - r[1] * r[8], r[1] * r[5] - r[2] * r[4],
+                              r[5] * r[6] - r[3] * r[8], r[0] * r[8] - r[2] * r[6], r[2] * r[3] - r[0] * r[5],
+                              r[3] * r[7] - r[4] * r[6], r[1] * r[6] - r[0] * r[7], r[0] * r[4] - r[1] * r[3]};
+  const double det = r[0] * adjugate[0] + r[1] * adjugate[3] + r[2] * adjugate[6];
+  for (int i = 0; i < 3; ++i) {
+    const double* a = adjugate + 3 * i;
+    const double center = -(a[0] * t[0] + a[1] * t[1] + a[2] * t[2]) / det;
+    view.center[i] = static_cast<float>(center);
+    view.center_low[i] = static_cast<float>(center - static_cast<double>(view.center[i]));
+  }
+  for (int i = 0; i < 9; ++i) view.rotation[i] = static_cast<float>(r[i]);
+  view.fx = camera.fx;
+  view.fy = camera.fy;
+  view.cx = camera.cx;
+  view.cy = camera.cy;
+  const float w = static_cast<float>(camera.width), h = static_cast<float>(camera.height);
+  view.min_x = (-(camera.cx + 0.5f) - 0.15f * w) / camera.fx;
+  view.max_x = (w - 0.5f - camera.cx + 0.15f * w) / camera.fx;
+  view.min_y = (-(camera.cy + 0.5f) - 0.15f * h) / camera.fy;
+  view.max_y = (h - 0.5f - camera.cy + 0.15f * h) / camera.fy;
+  view.near = near;
+  return view;
+}
+
+/// Can any gaussian of the block touch a pixel? With s the largest deviation and the Jacobian bounded by its clamp, a
+/// splat reaches at most 3.33 (f/z sqrt(1 + clamp²) s + sqrt(0.3)) px beyond its centre, so each image border is a
+/// plane in camera space.
+bool block_in_view(const Block& block, const AnchorView& view, const Frame& frame) {
+  float d[3], p[3];
+  for (int i = 0; i < 3; ++i) d[i] = (block.center[i] - view.center[i]) - view.center_low[i];
+  for (int i = 0; i < 3; ++i)
+    p[i] = view.rotation[3 * i] * d[0] + view.rotation[3 * i + 1] * d[1] + view.rotation[3 * i + 2] * d[2];
+  const float radius = block.radius * 1.0001f;
+  if (p[2] + radius <= view.near) return false;
+  constexpr float kReach = 3.331f, kMargin = 2.0f;
+  const auto inside = [&](float f, float center, float size, float position, float low, float high) {
+    const float bound = std::max(std::abs(low), std::abs(high));
+    const float reach = kReach * f * std::sqrt(1 + bound * bound) * block.max_scale;
+    const float before = center + kMargin, after = size - 1 - center + kMargin;
+    return f * position + before * p[2] + reach + radius * std::hypot(f, before) >= 0 &&
+           -f * position + after * p[2] + reach + radius * std::hypot(f, after) >= 0;
+  };
+  // The negation keeps blocks whose bounds are not finite.
+  return !(!inside(view.fx, view.cx, static_cast<float>(frame.width), p[0], view.min_x, view.max_x) ||
+           !inside(view.fy, view.cy, static_cast<float>(frame.height), p[1], view.min_y, view.max_y));
+}
+
+/// Calls emit(tile) for the tiles with a pixel inside the splat's cut ellipse, row by row.
+template <class Emit>
+void for_each_tile(const Splat& s, const Frame& frame, Emit&& emit) {
+  const auto first = [](float from) { return static_cast<int>(std::ceil(std::max(from, 0.0f))); };
+  const auto last = [](float to, int size) {
+    return static_cast<int>(std::min(std::floor(to), static_cast<float>(size - 1)));
+  };
+  const int x0 = first(s.u - s.extent_x), x1 = last(s.u + s.extent_x, frame.width);
+  const int y0 = first(s.v - s.extent_y), y1 = last(s.v + s.extent_y, frame.height);
+  if (x0 > x1 || y0 > y1) return;
+  const int tx0 = x0 / kTileSize, tx1 = x1 / kTileSize, ty0 = y0 / kTileSize, ty1 = y1 / kTileSize;
+  for (int ty = ty0; ty <= ty1; ++ty) {
+    int from = tx0, to = tx1;
+    if (tx0 != tx1 && ty0 != ty1) {
+      // The span of the ellipse over the tile's rows of pixel centres.
+      const float low = std::max(static_cast<float>(ty * kTileSize) - s.v, -s.extent_y);
+      const float high = std::min(static_cast<float>(ty * kTileSize + kTileSize - 1) - s.v, s.extent_y);
+      const auto edge = [&](float side) {
+        const float dy = std::clamp(side * s.peak_dy, low, high);
+        return s.u + s.slope * dy + side * (std::sqrt(std::max(0.0f, (s.cut + s.kc * dy * dy) * s.inv_ka)) + 1e-3f);
+      };
+      from = std::max(tx0, first(edge(-1)) / kTileSize);
+      to = std::min(tx1, last(edge(1), frame.width) / kTileSize);
+    }
+    for (int tx = from; tx <= to; ++tx) emit(static_cast<uint32_t>(ty * frame.tiles_x + tx));
+  }
+}
+
+void project_rank(const GaussianModel& model, Frame& frame, size_t rank, std::vector<uint32_t>& tiles) {
+  const Block& block = model.block(frame.blocks[rank]);
+  const AnchorView& view = frame.anchors[static_cast<size_t>(block.anchor)];
+  Splat* splats = &frame.splats[rank * kBlockSize];
+  const uint64_t candidates =
+      HWY_DYNAMIC_DISPATCH(project_block)(block, view, frame.width, frame.height, frame.sh_degree, splats);
+  uint64_t visible = 0;
+  for (uint64_t rest = candidates; rest != 0; rest &= rest - 1) {
+    const size_t lane = static_cast<size_t>(std::countr_zero(rest));
+    const size_t first = tiles.size();
+    for_each_tile(splats[lane], frame, [&](uint32_t tile) { tiles.push_back(tile); });
+    if (tiles.size() == first) continue;
+    visible |= uint64_t{1} << lane;
+    frame.instances[rank * kBlockSize + lane] = {static_cast<uint32_t>(first),
+                                                 static_cast<uint32_t>(tiles.size() - first)};
+  }
+  frame.visible[rank] = visible;
+}
+
+}  // namespace
+
+void project_model(const GaussianModel& model, const View& view, const RenderOptions& options, Executor& executor,
+                   Frame& frame) {
+  PHOTOSLAM_CHECK(view.camera.width >= 1 && view.camera.height >= 1, "{}x{}", view.camera.width, view.camera.height);
+  PHOTOSLAM_CHECK(view.camera_from_anchor.size() >= static_cast<size_t>(model.num_anchors()), "{} poses, {} anchors",
+                  view.camera_from_anchor.size(), model.num_anchors());
+  frame.width = view.camera.width;
+  frame.height = view.camera.height;
+  frame.tiles_x = (frame.width + kTileSize - 1) / kTileSize;
+  frame.tiles_y = (frame.height + kTileSize - 1) / kTileSize;
+  frame.sh_degree = std::clamp(std::min(options.sh_degree, model.sh_degree()), 0, kMaxShDegree);
+  std::copy_n(options.background, 3, frame.background);
+  frame.anchors.clear();
+  for (const Pose& pose : view.camera_from_anchor)
+    frame.anchors.push_back(make_anchor_view(pose, view.camera, options.near));
+
+  frame.blocks.clear();
+  for (size_t b = 0; b < model.num_blocks(); ++b) {
+    const Block& block = model.block(b);
+    if (block_in_view(block, frame.anchors[static_cast<size_t>(block.anchor)], frame))
+      frame.blocks.push_back(static_cast<uint32_t>(b));
+  }
+  frame.visible.assign(frame.blocks.size(), 0);
+  frame.splats.reserve(frame.blocks.size() * kBlockSize);
+  frame.instances.reserve(frame.blocks.size() * kBlockSize);
+  if (frame.task_tiles.size() < static_cast<size_t>(frame.num_tasks()))
+    frame.task_tiles.resize(static_cast<size_t>(frame.num_tasks()));
+  executor.for_each(frame.num_tasks(), [&](int task, int) {
+    std::vector<uint32_t>& tiles = frame.task_tiles[static_cast<size_t>(task)];
+    tiles.clear();
+    const int end = std::min((task + 1) * kBlocksPerTask, frame.num_ranks());
+    for (int rank = task * kBlocksPerTask; rank < end; ++rank)
+      project_rank(model, frame, static_cast<size_t>(rank), tiles);
+  });
+}
+
+}  // namespace photoslam::splatting
+#endif  // HWY_ONCE

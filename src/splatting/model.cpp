@@ -1,0 +1,273 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "splatting/model.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "base/check.h"
+
+namespace photoslam::splatting {
+namespace {
+
+/// Calls f(row) for every row of per-gaussian data of a block, whatever its type.
+template <class BlockType, class F>
+void for_each_row(BlockType& block, F&& f) {
+  for (auto& values : block.parameters) f(values);
+  for (auto& values : block.first_moments) f(values);
+  for (auto& values : block.second_moments) f(values);
+  f(block.updates);
+  f(block.gradient);
+  f(block.weight);
+  f(block.max_weight);
+  f(block.visible);
+  f(block.tags);
+  f(block.births);
+}
+
+constexpr int kWords = 3 * row::kCount + 7;  // of one gaussian, all rows
+
+/// One gaussian with everything that belongs to it, as 32-bit words.
+using Record = std::array<uint32_t, kWords>;
+
+Record take(const Block& block, int lane) {
+  Record record;
+  size_t i = 0;
+  for_each_row(block, [&](const auto& values) { record[i++] = std::bit_cast<uint32_t>(values[lane]); });
+  return record;
+}
+
+void put(Block& block, int lane, const Record& record) {
+  size_t i = 0;
+  for_each_row(block, [&](auto& values) {
+    values[lane] = std::bit_cast<std::remove_reference_t<decltype(values[lane])>>(record[i++]);
+  });
+}
+
+void clear_lane(Block& block, int lane) { put(block, lane, Record{}); }
+
+void write_parameters(Block& block, int lane, const Gaussian& g) {
+  for (int i = 0; i < 3; ++i) block.parameters[row::kMean + i][lane] = g.mean[i];
+  for (int i = 0; i < 4; ++i) block.parameters[row::kRotation + i][lane] = g.rotation[i];
+  for (int i = 0; i < 3; ++i) block.parameters[row::kLogScale + i][lane] = g.log_scale[i];
+  block.parameters[row::kOpacity][lane] = g.opacity_logit;
+  for (int k = 0; k < kNumShCoefficients; ++k)
+    for (int c = 0; c < 3; ++c) block.parameters[row::kSh + 3 * k + c][lane] = g.sh[k][c];
+}
+
+/// Interleaves the low 21 bits of three numbers.
+uint64_t morton_code(const std::array<uint32_t, 3>& cell) {
+  uint64_t code = 0;
+  for (int bit = 20; bit >= 0; --bit)
+    for (uint32_t axis : cell) code = (code << 1) | ((axis >> bit) & 1);
+  return code;
+}
+
+}  // namespace
+
+GaussianModel::GaussianModel() = default;
+GaussianModel::~GaussianModel() = default;
+GaussianModel::GaussianModel(GaussianModel&&) noexcept = default;
+GaussianModel& GaussianModel::operator=(GaussianModel&&) noexcept = default;
+
+int GaussianModel::add_anchor() {
+  blocks_of_anchor_.emplace_back();
+  return num_anchors() - 1;
+}
+
+Block& GaussianModel::append_block(int anchor) {
+  blocks_of_anchor_[static_cast<size_t>(anchor)].push_back(static_cast<uint32_t>(blocks_.size()));
+  blocks_.push_back(std::make_unique<Block>(Block{}));
+  blocks_.back()->anchor = anchor;
+  return *blocks_.back();
+}
+
+std::vector<size_t> GaussianModel::add(int anchor, std::span<const Gaussian> gaussians, uint32_t tag, uint32_t birth) {
+  PHOTOSLAM_CHECK(anchor >= 0 && anchor < num_anchors(), "anchor {} of {}", anchor, num_anchors());
+  std::vector<size_t> indices;
+  indices.reserve(gaussians.size());
+  const std::vector<uint32_t>& own = blocks_of_anchor_[static_cast<size_t>(anchor)];
+  for (const Gaussian& gaussian : gaussians) {
+    if (own.empty() || blocks_[own.back()]->count == kBlockSize) {
+      if (!indices.empty()) update_bounds(own.back());
+      append_block(anchor);
+    }
+    Block& block = *blocks_[own.back()];
+    const int lane = block.count++;
+    write_parameters(block, lane, gaussian);
+    block.tags[lane] = tag;
+    block.births[lane] = birth;
+    indices.push_back(size_t{own.back()} * kBlockSize + static_cast<size_t>(lane));
+  }
+  if (!indices.empty()) update_bounds(own.back());
+  size_ += gaussians.size();
+  return indices;
+}
+
+size_t GaussianModel::size(int anchor) const {
+  size_t count = 0;
+  for (uint32_t b : blocks_of_anchor_[static_cast<size_t>(anchor)]) count += static_cast<size_t>(blocks_[b]->count);
+  return count;
+}
+
+void GaussianModel::update_bounds(size_t index) {
+  Block& block = *blocks_[index];
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  float radius2 = 0;
+  for (int i = 0; i < 3; ++i) {
+    float low = kInfinity, high = -kInfinity;
+    const float* means = block.parameters[row::kMean + i];
+    for (int lane = 0; lane < block.count; ++lane) {
+      low = means[lane] < low ? means[lane] : low;
+      high = means[lane] > high ? means[lane] : high;
+    }
+    block.center[i] = low <= high ? 0.5f * low + 0.5f * high : 0.0f;
+    radius2 += low <= high ? (high - block.center[i]) * (high - block.center[i]) : 0.0f;
+  }
+  float log_scale = -kInfinity;
+  for (int i = 0; i < 3; ++i)
+    for (int lane = 0; lane < block.count; ++lane)
+      log_scale = std::max(log_scale, block.parameters[row::kLogScale + i][lane]);
+  block.radius = std::sqrt(radius2);
+  block.max_scale = std::exp(std::min(log_scale, 80.0f));
+}
+
+bool GaussianModel::contains(size_t index) const {
+  const size_t b = index / kBlockSize;
+  return b < blocks_.size() && static_cast<int>(index % kBlockSize) < blocks_[b]->count;
+}
+
+Gaussian GaussianModel::get(size_t index) const {
+  const Block& block = this->block(index / kBlockSize);
+  const size_t lane = index % kBlockSize;
+  Gaussian g;
+  for (int i = 0; i < 3; ++i) g.mean[i] = block.parameters[row::kMean + i][lane];
+  for (int i = 0; i < 4; ++i) g.rotation[i] = block.parameters[row::kRotation + i][lane];
+  for (int i = 0; i < 3; ++i) g.log_scale[i] = block.parameters[row::kLogScale + i][lane];
+  g.opacity_logit = block.parameters[row::kOpacity][lane];
+  for (int k = 0; k < kNumShCoefficients; ++k)
+    for (int c = 0; c < 3; ++c) g.sh[k][c] = block.parameters[row::kSh + 3 * k + c][lane];
+  return g;
+}
+
+void GaussianModel::set(size_t index, const Gaussian& gaussian) {
+  PHOTOSLAM_CHECK(contains(index), "no gaussian at index {}", index);
+  write_parameters(block(index / kBlockSize), static_cast<int>(index % kBlockSize), gaussian);
+  update_bounds(index / kBlockSize);
+}
+
+void GaussianModel::reset_optimizer(size_t index) {
+  Block& block = this->block(index / kBlockSize);
+  const size_t lane = index % kBlockSize;
+  for (auto& values : block.first_moments) values[lane] = 0;
+  for (auto& values : block.second_moments) values[lane] = 0;
+  block.updates[lane] = 0;
+}
+
+Statistics GaussianModel::statistics(size_t index) const {
+  const Block& block = this->block(index / kBlockSize);
+  const size_t lane = index % kBlockSize;
+  return {block.gradient[lane], block.weight[lane], block.max_weight[lane], block.visible[lane]};
+}
+
+void GaussianModel::reset_statistics() {
+  for (const auto& block : blocks_)
+    for (auto* values : {block->gradient, block->weight, block->max_weight, block->visible})
+      std::fill_n(values, kBlockSize, 0.0f);
+}
+
+size_t GaussianModel::remove_if(const std::function<bool(size_t)>& predicate) {
+  size_t removed = 0;
+  for (std::vector<uint32_t>& own : blocks_of_anchor_) {
+    size_t to = 0;  // gaussians kept so far: they fill the anchor's blocks from the front
+    for (uint32_t b : own)
+      for (int lane = 0; lane < blocks_[b]->count; ++lane) {
+        if (predicate(size_t{b} * kBlockSize + static_cast<size_t>(lane))) {
+          ++removed;
+          continue;
+        }
+        Block& target = *blocks_[own[to / kBlockSize]];
+        const int target_lane = static_cast<int>(to % kBlockSize);
+        if (&target != blocks_[b].get() || target_lane != lane) put(target, target_lane, take(*blocks_[b], lane));
+        ++to;
+      }
+    for (size_t i = 0; i < own.size(); ++i) {
+      Block& block = *blocks_[own[i]];
+      const size_t kept = to > i * kBlockSize ? std::min<size_t>(to - i * kBlockSize, kBlockSize) : 0;
+      for (int lane = static_cast<int>(kept); lane < block.count; ++lane) clear_lane(block, lane);
+      if (static_cast<int>(kept) != block.count || removed > 0) {
+        block.count = static_cast<int>(kept);
+        update_bounds(own[i]);
+      }
+    }
+  }
+  size_ -= removed;
+
+  std::vector<std::unique_ptr<Block>> kept;
+  for (std::vector<uint32_t>& own : blocks_of_anchor_) own.clear();
+  for (auto& block : blocks_) {
+    if (block->count == 0) continue;
+    blocks_of_anchor_[static_cast<size_t>(block->anchor)].push_back(static_cast<uint32_t>(kept.size()));
+    kept.push_back(std::move(block));
+  }
+  blocks_ = std::move(kept);
+  return removed;
+}
+
+size_t GaussianModel::remove(std::span<const uint8_t> mask) {
+  PHOTOSLAM_CHECK(mask.size() == index_end(), "mask of {} for {} indices", mask.size(), index_end());
+  return remove_if([&](size_t index) { return mask[index] != 0; });
+}
+
+void GaussianModel::rescale_anchor(int anchor, float factor) {
+  PHOTOSLAM_CHECK(factor > 0, "factor {}", factor);
+  const float log_factor = std::log(factor);
+  for (uint32_t b : blocks_of_anchor_[static_cast<size_t>(anchor)]) {
+    Block& block = *blocks_[b];
+    for (int lane = 0; lane < block.count; ++lane) {
+      for (int i = 0; i < 3; ++i) block.parameters[row::kMean + i][lane] *= factor;
+      for (int i = 0; i < 3; ++i) block.parameters[row::kLogScale + i][lane] += log_factor;
+    }
+    update_bounds(b);
+  }
+}
+
+void GaussianModel::sort_spatially() {
+  for (const std::vector<uint32_t>& own : blocks_of_anchor_) {
+    float low[3], high[3];
+    std::fill_n(low, 3, std::numeric_limits<float>::infinity());
+    std::fill_n(high, 3, -std::numeric_limits<float>::infinity());
+    for (uint32_t b : own)
+      for (int i = 0; i < 3; ++i) {
+        low[i] = std::min(low[i], blocks_[b]->center[i] - blocks_[b]->radius);
+        high[i] = std::max(high[i], blocks_[b]->center[i] + blocks_[b]->radius);
+      }
+    std::vector<Record> records;
+    std::vector<std::pair<uint64_t, size_t>> order;
+    for (uint32_t b : own)
+      for (int lane = 0; lane < blocks_[b]->count; ++lane) {
+        std::array<uint32_t, 3> cell{};
+        for (size_t i = 0; i < 3; ++i) {
+          const float at = (blocks_[b]->parameters[row::kMean + i][lane] - low[i]) / (high[i] - low[i]);
+          cell[i] = at > 0 ? static_cast<uint32_t>(std::min(at, 1.0f) * 2097151.0f) : 0;  // not a number: 0
+        }
+        order.emplace_back(morton_code(cell), records.size());
+        records.push_back(take(*blocks_[b], lane));
+      }
+    std::sort(order.begin(), order.end());
+    for (size_t i = 0; i < order.size(); ++i)
+      put(*blocks_[own[i / kBlockSize]], static_cast<int>(i % kBlockSize), records[order[i].second]);
+    for (uint32_t b : own) update_bounds(b);
+  }
+}
+
+void GaussianModel::set_sh_degree(int degree) {
+  PHOTOSLAM_CHECK(degree >= 0 && degree <= kMaxShDegree, "degree {}", degree);
+  sh_degree_ = degree;
+}
+
+}  // namespace photoslam::splatting
