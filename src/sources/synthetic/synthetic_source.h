@@ -30,6 +30,9 @@ class SyntheticCamera {
   /// The frame as the sensor delivers it; depth in units of kMetresPerDepthUnit.
   Frame frame(int index, Executor& executor) const;
 
+  /// Turns an ideal view of a frame into what the sensor delivers.
+  Frame sense(int index, const RoomView& ideal, double metres_per_depth_unit) const;
+
   static constexpr double kMetresPerDepthUnit = 1.0 / 5000.0;
 
  private:

@@ -1,0 +1,218 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "sources/synthetic/room.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/check.h"
+#include "sources/synthetic/furniture/furniture.h"
+
+namespace photoslam {
+
+using synthetic::Color;
+using synthetic::Material;
+using synthetic::Patch;
+using synthetic::RayTracer;
+using synthetic::Triangle;
+using synthetic::Vec2f;
+using synthetic::Vec3f;
+using synthetic::Vertex;
+
+namespace {
+
+constexpr float kExposure = 0.62f;  // radiance of the image per radiance in the room
+constexpr int kSamples = 4;         // rays per pixel, on a rotated grid
+constexpr double kSampleX[kSamples] = {-0.125, 0.375, 0.125, -0.375};
+constexpr double kSampleY[kSamples] = {-0.375, -0.125, 0.375, 0.125};
+
+/// Origin and directions of a camera's rays; a ray's parameter is the depth (z coordinate) in the camera.
+struct Eye {
+  Vec3 origin;
+  Mat3 world_from_camera;
+  PinholeCamera camera;
+
+  Vec3 direction(double x, double y) const { return world_from_camera * camera.unproject(Vec2(x, y), 1.0); }
+};
+
+/// Schlick's approximation of the Fresnel reflectance.
+float fresnel(float at_normal, float cosine) {
+  const float m = 1 - cosine, m2 = m * m;
+  return at_normal + (1 - at_normal) * m2 * m2 * m;
+}
+
+}  // namespace
+
+struct SyntheticRoom::State {
+  synthetic::RoomModel model;
+  RayTracer tracer;
+  synthetic::LightMap light;
+
+  State(synthetic::RoomModel m, Executor& executor)
+      : model(std::move(m)), tracer(model.mesh), light(model.mesh, model.textures, tracer, model.lights, executor) {}
+
+  void render_colors(const Eye& eye, int y, RoomView& view) const;
+  void measure_geometry(const Eye& eye, int y, RoomView& view) const;
+  Color shade(const RayTracer::Hits& hits, int ray, const Vec3f& origin, const Vec3f& direction, float focal) const;
+  Color mirrored_light(const Vec3f& position, const Vec3f& reflected, float roughness, float visible) const;
+  Color outside(const Vec3f& origin, const Vec3f& direction) const;
+};
+
+/// What the ray sees through the window, at a distance where no furniture is.
+Color SyntheticRoom::State::outside(const Vec3f& origin, const Vec3f& direction) const {
+  if (direction.x() <= 1e-6f) return Color::Zero();
+  const float t = (model.backdrop_corner.x() - origin.x()) / direction.x();
+  const Vec3f offset = origin + t * direction - model.backdrop_corner;
+  const float x = offset.dot(model.backdrop_right.normalized()), y = offset.dot(model.backdrop_down.normalized());
+  return 2.2f * model.backdrop.sample(x, y, 0.03f);
+}
+
+/// The window as seen in a glossy surface: sharp when smooth, wide and faint when rough.
+Color SyntheticRoom::State::mirrored_light(const Vec3f& position, const Vec3f& reflected, float roughness,
+                                           float visible) const {
+  const synthetic::AreaLight& window = model.lights.areas.front();
+  const float towards = -reflected.dot(window.normal);
+  if (towards <= 0.02f || visible <= 0) return Color::Zero();
+  const float t = (position - window.center).dot(window.normal) / towards;
+  if (t <= 0) return Color::Zero();
+  const Vec3f at = position + t * reflected - window.center;
+  const float blur = roughness * t;
+  const auto coverage = [blur](float offset, float half) {
+    const float a = std::clamp((half - offset) / (2 * blur) + 0.5f, 0.0f, 1.0f);
+    const float b = std::clamp((half + offset) / (2 * blur) + 0.5f, 0.0f, 1.0f);
+    return a * a * (3 - 2 * a) + b * b * (3 - 2 * b) - 1;
+  };
+  const float half_u = window.half_u.norm(), half_v = window.half_v.norm();
+  const float share =
+      coverage(at.dot(window.half_u) / half_u, half_u) * coverage(at.dot(window.half_v) / half_v, half_v);
+  return window.radiance * (std::max(share, 0.0f) * visible);
+}
+
+Color SyntheticRoom::State::shade(const RayTracer::Hits& hits, int ray, const Vec3f& origin, const Vec3f& direction,
+                                  float focal) const {
+  const size_t k = static_cast<size_t>(ray);
+  if (hits.triangle[k] < 0) return outside(origin, direction);
+  const Triangle& triangle = model.mesh.triangles[static_cast<size_t>(hits.triangle[k])];
+  const Patch& patch = model.mesh.patches[triangle.patch];
+  const Material& material = model.mesh.materials[static_cast<size_t>(patch.material)];
+  const Vertex &a = model.mesh.vertices[triangle.vertices[0]], &b = model.mesh.vertices[triangle.vertices[1]],
+               &c = model.mesh.vertices[triangle.vertices[2]];
+  const float wb = hits.u[k], wc = hits.v[k], wa = 1 - wb - wc;
+  const Vec2f uv = wa * a.uv + wb * b.uv + wc * c.uv;
+  const Vec3f view = -direction.normalized();
+  Vec3f normal = (wa * a.normal + wb * b.normal + wc * c.normal).normalized();
+  float cosine = normal.dot(view);
+  if (cosine < 0) {
+    normal = -normal;
+    cosine = -cosine;
+  }
+  cosine = std::max(cosine, 0.02f);
+
+  // One of the samples stands for half a pixel across, and for a quarter of the pixel's length on a slanted surface.
+  const float across = hits.distance[k] / focal;
+  const float footprint = std::max(0.5f * across, std::min(0.25f * across / cosine, 2 * across));
+  const Vec2f place =
+      patch.texture_origin + (patch.swap_uv ? Vec2f(uv.y(), uv.x()) : uv).cwiseProduct(patch.texture_size);
+  const Color albedo = model.textures[static_cast<size_t>(material.texture)].sample(place.x(), place.y(),
+                                                                                    footprint * patch.texture_metres);
+  const Color incoming = light.sample(patch, uv);
+  Color out = albedo * (incoming + material.emission);
+  const float gloss = material.gloss * albedo[3];
+  if (gloss > 0.004f) {
+    const Vec3f position = origin + hits.distance[k] * direction;
+    const Vec3f reflected = 2 * normal.dot(view) * normal - view;
+    const float reflectance = fresnel(gloss, cosine) * (1 - material.roughness);
+    // Apart from the window, a surface mirrors about as much light as falls on it.
+    out += reflectance * (0.8f * incoming + mirrored_light(position, reflected, material.roughness, incoming[3]));
+  }
+  return out;
+}
+
+void SyntheticRoom::State::render_colors(const Eye& eye, int y, RoomView& view) const {
+  constexpr int kPixels = RayTracer::kRays / kSamples;
+  const Vec3f origin = eye.origin.cast<float>();
+  const float focal = static_cast<float>(std::min(eye.camera.fx, eye.camera.fy));
+  RayTracer::Rays rays;
+  RayTracer::Hits hits;
+  rays.origin = origin;
+  for (int x0 = 0; x0 < eye.camera.width; x0 += kPixels) {
+    for (int i = 0; i < RayTracer::kRays; ++i) {
+      const int x = x0 + i / kSamples, s = i % kSamples;
+      if (x < eye.camera.width) {
+        rays.set(i, eye.direction(x + kSampleX[s], y + kSampleY[s]).cast<float>());
+      } else {
+        rays.skip(i);
+      }
+    }
+    tracer.intersect(rays, hits);
+    for (int x = x0; x < std::min(x0 + kPixels, eye.camera.width); ++x) {
+      Color sum = Color::Zero();
+      for (int s = 0; s < kSamples; ++s) {
+        const int ray = (x - x0) * kSamples + s;
+        // Lights do not bleed over the edges of what stands before them.
+        sum += shade(hits, ray, origin, rays.direction(ray), focal).min(3.0f / kExposure);
+      }
+      for (int c = 0; c < 3; ++c) view.radiance(x, y, c) = sum[c] * (kExposure / kSamples);
+    }
+  }
+}
+
+void SyntheticRoom::State::measure_geometry(const Eye& eye, int y, RoomView& view) const {
+  RayTracer::Rays rays;
+  RayTracer::Hits hits;
+  rays.origin = eye.origin.cast<float>();
+  for (int x0 = 0; x0 < eye.camera.width; x0 += RayTracer::kRays) {
+    const int count = std::min(RayTracer::kRays, eye.camera.width - x0);
+    for (int i = 0; i < RayTracer::kRays; ++i) {
+      if (i < count) {
+        rays.set(i, eye.direction(x0 + i, y).cast<float>());
+      } else {
+        rays.skip(i);
+      }
+    }
+    tracer.intersect(rays, hits);
+    for (int i = 0; i < count; ++i) {
+      const Vec3 direction = eye.direction(x0 + i, y);
+      const int32_t id = hits.triangle[static_cast<size_t>(i)];
+      double depth = 0, cosine = 1;
+      if (id >= 0) {
+        // The ray tracer tells which triangle; its plane is intersected in double precision.
+        const auto corner = [&](size_t k) -> Vec3 {
+          const Triangle& triangle = model.mesh.triangles[static_cast<size_t>(id)];
+          return model.mesh.vertices[triangle.vertices[k]].position.cast<double>();
+        };
+        const Vec3 normal = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+        depth = normal.dot(corner(0) - eye.origin) / normal.dot(direction);
+        cosine = std::abs(normal.normalized().dot(direction.normalized()));
+      } else if (direction.x() > 1e-6) {
+        depth = (model.backdrop_corner.x() - eye.origin.x()) / direction.x();
+        cosine = std::abs(direction.normalized().x());
+      }
+      view.depth(x0 + i, y) = static_cast<float>(depth);
+      view.incidence(x0 + i, y) = static_cast<float>(cosine);
+    }
+  }
+}
+
+SyntheticRoom::SyntheticRoom(uint64_t seed, Executor& executor)
+    : state_(std::make_unique<const State>(synthetic::furnish_room(seed, size(), executor), executor)) {}
+SyntheticRoom::~SyntheticRoom() = default;
+SyntheticRoom::SyntheticRoom(SyntheticRoom&&) noexcept = default;
+SyntheticRoom& SyntheticRoom::operator=(SyntheticRoom&&) noexcept = default;
+
+RoomView SyntheticRoom::render(const SE3& world_from_camera, const PinholeCamera& camera, Executor& executor) const {
+  PHOTOSLAM_CHECK(camera.width > 0 && camera.height > 0 && camera.fx > 0 && camera.fy > 0, "{} x {}", camera.width,
+                  camera.height);
+  RoomView view;
+  view.radiance = ImageF(camera.width, camera.height, 3);
+  view.depth = ImageF(camera.width, camera.height);
+  view.incidence = ImageF(camera.width, camera.height);
+  const Eye eye{world_from_camera.translation, world_from_camera.matrix3(), camera};
+  executor.for_each(camera.height, [&](int y, int) {
+    state_->render_colors(eye, y, view);
+    state_->measure_geometry(eye, y, view);
+  });
+  return view;
+}
+
+}  // namespace photoslam

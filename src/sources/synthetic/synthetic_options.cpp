@@ -1,0 +1,28 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "sources/synthetic/synthetic_options.h"
+
+namespace photoslam {
+
+void SyntheticOptions::visit(OptionVisitor& visitor) {
+  visitor.value({"num_frames", "", 1, 1e6, "Length of the sequence."}, num_frames);
+  visitor.value({"frames_per_second", "Hz", 1, 240, "Rate of the camera."}, frames_per_second);
+  visitor.value({"width", "px", 16, 8192, "Width of the images."}, camera.width);
+  visitor.value({"height", "px", 16, 8192, "Height of the images."}, camera.height);
+  visitor.value({"fx", "px", 1, 1e5, "Horizontal focal length."}, camera.fx);
+  visitor.value({"fy", "px", 1, 1e5, "Vertical focal length."}, camera.fy);
+  visitor.value({"cx", "px", -1e5, 1e5, "Principal point, from the centre of the leftmost pixels."}, camera.cx);
+  visitor.value({"cy", "px", -1e5, 1e5, "Principal point, from the centre of the topmost pixels."}, camera.cy);
+  visitor.value({"seed", "", 0, 2147483647, "Another room, another shake of the hand, another noise."}, seed);
+  visitor.value({"seconds_per_lap", "s", 1, 1e4, "Time of one loop; below 10 the motion gets fast."}, seconds_per_lap);
+  visitor.value({"image_noise", "grey levels", 0, 50, "Standard deviation of the image noise at mid-grey."},
+                image_noise);
+  visitor.value(
+      {"depth_noise", "m", 0, 0.1, "Standard deviation of the depth at 1 m; it grows with the square of the depth."},
+      depth_noise);
+  visitor.value({"depth_holes", "", 0, 1, "Share of pixels at depth edges and grazing surfaces without a depth."},
+                depth_holes);
+  visitor.value({"exposure_drift", "EV", 0, 4, "Largest slow change of the exposure."}, exposure_drift);
+}
+
+}  // namespace photoslam

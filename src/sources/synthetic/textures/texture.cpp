@@ -1,0 +1,114 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "sources/synthetic/textures/texture.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "base/check.h"
+#include "sources/synthetic/textures/noise.h"
+
+namespace photoslam::synthetic {
+namespace {
+
+uint32_t pack(const Color& c) {
+  const Eigen::Array4i v = (c * 255.0f + 0.5f).max(0.0f).min(255.0f).cast<int>();
+  return static_cast<uint32_t>(v[0] | v[1] << 8 | v[2] << 16 | v[3] << 24);
+}
+
+Color unpack(uint32_t texel) {
+  return Eigen::Array<uint8_t, 4, 1>(std::bit_cast<std::array<uint8_t, 4>>(texel).data()).cast<float>();
+}
+
+/// Index into `size` texels continued by mirroring.
+int mirrored(int i, int size) {
+  if (static_cast<unsigned>(i) < static_cast<unsigned>(size)) return i;
+  i %= 2 * size;
+  if (i < 0) i += 2 * size;
+  return i < size ? i : 2 * size - 1 - i;
+}
+
+}  // namespace
+
+Texture Texture::paint(float width, float height, float texels_per_metre, const Shader& shader, Executor& executor) {
+  PHOTOSLAM_CHECK(width > 0 && height > 0 && texels_per_metre > 0, "{} x {} m at {} per m", width, height,
+                  texels_per_metre);
+  Texture texture;
+  texture.width_ = width;
+  texture.height_ = height;
+  texture.texels_per_metre_ = texels_per_metre;
+  Level base;
+  base.width = std::max(1, static_cast<int>(std::lround(width * texels_per_metre)));
+  base.height = std::max(1, static_cast<int>(std::lround(height * texels_per_metre)));
+  base.texels.resize(static_cast<size_t>(base.width) * static_cast<size_t>(base.height));
+  constexpr int kRows = 16;
+  executor.for_each((base.height + kRows - 1) / kRows, [&](int band, int) {
+    for (int y = band * kRows; y < std::min(base.height, (band + 1) * kRows); ++y) {
+      uint32_t* row = base.texels.data() + static_cast<size_t>(y) * static_cast<size_t>(base.width);
+      for (int x = 0; x < base.width; ++x) {
+        row[x] = pack(shader((static_cast<float>(x) + 0.5f) * width / static_cast<float>(base.width),
+                             (static_cast<float>(y) + 0.5f) * height / static_cast<float>(base.height)));
+      }
+    }
+  });
+  texture.levels_.push_back(std::move(base));
+  while (std::min(texture.levels_.back().width, texture.levels_.back().height) > 1) {
+    texture.levels_.push_back(shrink(texture.levels_.back()));
+  }
+  return texture;
+}
+
+Texture::Level Texture::shrink(const Level& level) {
+  Level half;
+  half.width = level.width / 2;
+  half.height = level.height / 2;
+  half.texels.resize(static_cast<size_t>(half.width) * static_cast<size_t>(half.height));
+  for (int y = 0; y < half.height; ++y) {
+    for (int x = 0; x < half.width; ++x) {
+      // Light adds up in linear values, of which the texels hold the square roots.
+      Color sum = Color::Zero();
+      for (int k = 0; k < 4; ++k) {
+        const size_t at =
+            static_cast<size_t>(2 * y + k / 2) * static_cast<size_t>(level.width) + static_cast<size_t>(2 * x + k % 2);
+        sum += unpack(level.texels[at]).square();
+      }
+      half.texels[static_cast<size_t>(y) * static_cast<size_t>(half.width) + static_cast<size_t>(x)] =
+          pack((sum / 4.0f).sqrt() / 255.0f);
+    }
+  }
+  return half;
+}
+
+Color Texture::bilinear(const Level& level, float x, float y) {
+  const float tx = x * static_cast<float>(level.width) - 0.5f, ty = y * static_cast<float>(level.height) - 0.5f;
+  const int ix = floor_int(tx), iy = floor_int(ty);
+  const float fx = tx - static_cast<float>(ix), fy = ty - static_cast<float>(iy);
+  const int x0 = mirrored(ix, level.width), x1 = mirrored(ix + 1, level.width);
+  const uint32_t* row0 = level.texels.data() + static_cast<ptrdiff_t>(mirrored(iy, level.height)) * level.width;
+  const uint32_t* row1 = level.texels.data() + static_cast<ptrdiff_t>(mirrored(iy + 1, level.height)) * level.width;
+  const Color upper = unpack(row0[x0]) * (1 - fx) + unpack(row0[x1]) * fx;
+  const Color lower = unpack(row1[x0]) * (1 - fx) + unpack(row1[x1]) * fx;
+  return upper * (1 - fy) + lower * fy;
+}
+
+Color Texture::sample(float x, float y, float footprint) const {
+  const float u = x / width_, v = y / height_;
+  const float ratio = std::max(1.0f, footprint * texels_per_metre_);
+  const int last = static_cast<int>(levels_.size()) - 1;
+  // The exponent and mantissa of the ratio are the level and a linear blend to the next one.
+  const uint32_t bits = std::bit_cast<uint32_t>(ratio);
+  const int level = std::min(static_cast<int>(bits >> 23) - 127, last);
+  const float blend = std::bit_cast<float>((bits & 0x7FFFFFu) | 0x3F800000u) - 1.0f;
+  Color c = bilinear(levels_[static_cast<size_t>(level)], u, v);
+  if (level < last && blend > 0) {
+    c = c * (1 - blend) + bilinear(levels_[static_cast<size_t>(level) + 1], u, v) * blend;
+  }
+  c *= 1.0f / 255.0f;
+  const float gloss = c[3];
+  c = c.square();
+  c[3] = gloss;
+  return c;
+}
+
+}  // namespace photoslam::synthetic
