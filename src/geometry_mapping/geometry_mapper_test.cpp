@@ -1,0 +1,112 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "geometry_mapping/geometry_mapper.h"
+
+#include <gtest/gtest.h>
+
+#include "map/testing/point_world.h"
+
+namespace photoslam {
+namespace {
+
+using testing::PointWorld;
+
+/// Runs tracking and mapping together over the walk; returns the RMSE of the final frame poses [m].
+class WalkTest : public ::testing::Test {
+ protected:
+  void walk(PointWorld& world, int num_frames) {
+    Tracker tracker({}, {}, world.camera, world.bf);
+    mapper.emplace(GeometryMapperOptions{}, OrbOptions{}, world.camera, world.bf);
+    std::shared_ptr<const MapSnapshot> snapshot;
+    for (int frame = 0; frame < num_frames; ++frame) {
+      const SE3 truth = PointWorld::camera_from_world(frame / 30.0);
+      const TrackingResult result = tracker.track(world.observe(truth, frame), snapshot, true);
+      ASSERT_TRUE(result.has_pose) << "frame " << frame << ": " << result.reason;
+      frames.push_back({truth, result.reference, result.camera_from_reference});
+      if (!result.keyframe) continue;
+      updates.push_back(mapper->process(*result.keyframe));
+      snapshot = updates.back().map;
+    }
+  }
+
+  double final_rmse() const {
+    double sum = 0;
+    for (const auto& frame : frames) {
+      const SE3 estimate = frame.camera_from_reference * mapper->map().keyframe(frame.reference).camera_from_world;
+      sum += (estimate.inverse().translation - frame.truth.inverse().translation).squaredNorm();
+    }
+    return std::sqrt(sum / static_cast<double>(frames.size()));
+  }
+
+  struct TrackedFrame {
+    SE3 truth;
+    KeyframeId reference;
+    SE3 camera_from_reference;
+  };
+  std::optional<GeometryMapper> mapper;
+  std::vector<GeometryUpdate> updates;
+  std::vector<TrackedFrame> frames;
+};
+
+TEST_F(WalkTest, ExactFeaturesGiveAnExactMap) {
+  PointWorld world;
+  walk(world, 150);
+  EXPECT_GE(updates.size(), 5u);
+  EXPECT_LT(final_rmse(), 1e-4);
+  size_t alive = 0;
+  for (size_t i = 0; i < mapper->map().num_landmarks(); ++i) {
+    const LandmarkView& view = mapper->map().landmark(LandmarkId(static_cast<int32_t>(i))).view;
+    if (!view.alive) continue;
+    ++alive;
+    double nearest = 1e9;
+    for (const Vec3& point : world.points) nearest = std::min(nearest, (point - view.position).norm());
+    EXPECT_LT(nearest, 1e-3) << "landmark " << i;
+  }
+  EXPECT_GT(alive, 500u);
+}
+
+TEST_F(WalkTest, NoisyFeaturesGiveAPoseErrorFarBelowTheNoise) {
+  PointWorld world;
+  world.pixel_noise = 0.7;
+  walk(world, 150);
+  EXPECT_LT(final_rmse(), 0.004);
+}
+
+TEST_F(WalkTest, LandmarksAreNotDuplicated) {
+  PointWorld world;
+  world.pixel_noise = 0.3;
+  walk(world, 150);
+  // Every world point is one landmark at most, but for those still on trial.
+  std::map<uint64_t, int> landmarks_of_descriptor;
+  int alive = 0, duplicates = 0;
+  for (size_t i = 0; i < mapper->map().num_landmarks(); ++i) {
+    const Landmark& landmark = mapper->map().landmark(LandmarkId(static_cast<int32_t>(i)));
+    if (!landmark.view.alive) continue;
+    ++alive;
+    if (landmarks_of_descriptor[landmark.view.descriptor[0]]++ > 0) ++duplicates;
+  }
+  EXPECT_LT(duplicates, alive / 50);
+}
+
+TEST_F(WalkTest, TheSameInputGivesTheSameMap) {
+  PointWorld a, b;
+  a.pixel_noise = b.pixel_noise = 0.5;
+  walk(a, 60);
+  const Map& map = mapper->map();
+  std::vector<SE3> first;
+  for (size_t k = 0; k < map.num_keyframes(); ++k) {
+    first.push_back(map.keyframe(KeyframeId(static_cast<int32_t>(k))).camera_from_world);
+  }
+  frames.clear();
+  updates.clear();
+  walk(b, 60);
+  ASSERT_EQ(mapper->map().num_keyframes(), first.size());
+  for (size_t k = 0; k < first.size(); ++k) {
+    const SE3& pose = mapper->map().keyframe(KeyframeId(static_cast<int32_t>(k))).camera_from_world;
+    EXPECT_EQ(pose.translation, first[k].translation);
+    EXPECT_EQ(pose.rotation.coeffs(), first[k].rotation.coeffs());
+  }
+}
+
+}  // namespace
+}  // namespace photoslam
