@@ -97,7 +97,7 @@ struct Consumer {
 
   HWY_INLINE void consume(int r, Lanes gradient) {
     if (target.dense != nullptr) {
-      store(select(mask, gradient, Lanes(0.0f)), target.dense + r * kBlockSize + lane);
+      hn::StoreU(select(mask, gradient, Lanes(0.0f)).v, kFloats, target.dense + r * kBlockSize + lane);
     } else if (target.model != nullptr && constants.rates[r] != 0) {
       adam(r, gradient);
     }
