@@ -1,0 +1,64 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "photorealistic_mapping/keyframe_schedule.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+namespace photoslam {
+namespace {
+
+TEST(KeyframeSchedule, LevelsFallWithUseAsInEquationFive) {
+  ScheduleOptions options;
+  options.pyramid_levels = 2;
+  options.uses_per_level = 3;
+  options.online_level = 0;
+  KeyframeSchedule schedule(options, 1);
+  schedule.add_view();
+  std::vector<int> levels;
+  for (int i = 0; i < 8; ++i) levels.push_back(schedule.next(false).level);
+  EXPECT_EQ(levels, (std::vector{2, 2, 2, 1, 1, 1, 0, 0}));
+}
+
+TEST(KeyframeSchedule, OnlineStopsAtItsLevelAndRefinementGoesOn) {
+  ScheduleOptions options;
+  options.online_level = 1;
+  KeyframeSchedule schedule(options, 1);
+  schedule.add_view();
+  int finest_online = 3;
+  for (int i = 0; i < 50; ++i) finest_online = std::min(finest_online, schedule.next(false).level);
+  EXPECT_EQ(finest_online, 1);
+  EXPECT_EQ(schedule.next(true).level, 0);
+}
+
+TEST(KeyframeSchedule, WithoutAPyramidEverythingIsFullResolution) {
+  ScheduleOptions options;
+  options.pyramid_levels = 0;
+  KeyframeSchedule schedule(options, 1);
+  schedule.add_view();
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(schedule.next(false).level, 0);
+}
+
+TEST(KeyframeSchedule, EveryViewComesOncePerRound) {
+  KeyframeSchedule schedule({}, 3);
+  for (int i = 0; i < 7; ++i) schedule.add_view();
+  std::map<int, int> uses;
+  for (int i = 0; i < 7 * 5; ++i) ++uses[schedule.next(true).view];
+  for (int view = 0; view < 7; ++view) EXPECT_EQ(uses[view], 5) << view;
+}
+
+TEST(KeyframeSchedule, TheNewestViewGetsItsShare) {
+  ScheduleOptions options;
+  options.newest_probability = 0.3;
+  KeyframeSchedule schedule(options, 4);
+  for (int i = 0; i < 100; ++i) schedule.add_view();
+  int newest = 0;
+  constexpr int kDraws = 20000;
+  for (int i = 0; i < kDraws; ++i) newest += schedule.next(false).view == 99;
+  const double expected = 0.3 + 0.7 / 100;
+  EXPECT_NEAR(static_cast<double>(newest) / kDraws, expected, 0.015);  // 4.6 standard deviations
+}
+
+}  // namespace
+}  // namespace photoslam

@@ -1,0 +1,143 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "photorealistic_mapping/seeding.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "math/se3.h"
+
+namespace photoslam {
+namespace {
+
+constexpr double kUnit = 0.001;
+constexpr int kCell = 4;
+
+/// A view of the plane z = depth + slope x, of one colour, before an empty map.
+struct Scene {
+  CameraView view;
+  splatting::RenderResult render;
+
+  explicit Scene(double depth, double slope = 0) {
+    view.camera = {64, 48, 60, 60, 31, 25};
+    view.color = ImageU8(64, 48, 3, 0);
+    view.depth = ImageU16(64, 48);
+    for (int y = 0; y < 48; ++y) {
+      for (int x = 0; x < 64; ++x) {
+        view.color(x, y, 0) = 51;
+        view.color(x, y, 1) = 102;
+        view.color(x, y, 2) = 204;
+        // z = depth + slope * X with X = (x - cx) / fx * z
+        const double z = depth / (1.0 - slope * (x - view.camera.cx) / view.camera.fx);
+        view.depth(x, y) = static_cast<uint16_t>(std::lround(z / kUnit));
+      }
+    }
+    render.width = 64;
+    render.height = 48;
+    render.rgb.assign(64 * 48 * 3, 0.0f);
+    render.depth.assign(64 * 48, 0.0f);
+    render.alpha.assign(64 * 48, 0.0f);
+  }
+
+  void render_exactly() {
+    for (size_t i = 0; i < 64 * 48; ++i) {
+      render.alpha[i] = 1;
+      render.depth[i] = static_cast<float>(view.depth.values()[i] * kUnit);
+      for (size_t c = 0; c < 3; ++c)
+        render.rgb[c * 64 * 48 + i] = static_cast<float>(view.color.values()[3 * i + c]) / 255;
+    }
+  }
+};
+
+Mat3 axes_of(const splatting::Gaussian& g) {
+  return Quat(static_cast<double>(g.rotation[0]), static_cast<double>(g.rotation[1]),
+              static_cast<double>(g.rotation[2]), static_cast<double>(g.rotation[3]))
+      .toRotationMatrix();
+}
+
+TEST(SeedCells, OneDiscPerCellOnTheMeasuredSurface) {
+  const SeedingOptions options;
+  Scene scene(2.0);
+  const auto seeds = seed_cells(options, scene.view, kUnit, scene.render, kCell, options.min_color_error);
+  ASSERT_EQ(seeds.size(), 16u * 12u);
+  for (const auto& g : seeds) {
+    EXPECT_NEAR(g.mean[2], 2.0, 1e-6);
+    EXPECT_NEAR(std::exp(g.log_scale[1]), options.sigma_cells * kCell * 2.0 / 60, 1e-5);
+    EXPECT_NEAR(std::abs(axes_of(g)(2, 2)), 1.0, 1e-5) << "the thin axis is the normal of the plane";
+    EXPECT_NEAR(1 / (1 + std::exp(-g.opacity_logit)), options.opacity, 1e-5);
+    const double expected[3] = {0.2, 0.4, 0.8};
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(0.5 + 0.28209479 * g.sh[0][c], expected[c], 1e-5);
+  }
+}
+
+TEST(SeedCells, TiltedSurfacesGetDiscsAlongThem) {
+  const SeedingOptions options;
+  const double slope = 1.0;
+  Scene scene(2.0, slope);
+  const auto seeds = seed_cells(options, scene.view, kUnit, scene.render, kCell, options.min_color_error);
+  const Vec3 normal = Vec3(-slope, 0, 1).normalized();
+  int checked = 0;
+  for (const auto& g : seeds) {
+    const Vec3 mean(static_cast<double>(g.mean[0]), static_cast<double>(g.mean[1]), static_cast<double>(g.mean[2]));
+    EXPECT_NEAR(mean.z(), 2.0 + slope * mean.x(), 0.03) << "on the plane, to the size of a cell";
+    EXPECT_GT(std::abs(axes_of(g).col(2).dot(normal)), 0.99);
+    EXPECT_GT(g.log_scale[0], g.log_scale[1]) << "stretched along the slope";
+    ++checked;
+  }
+  EXPECT_GT(checked, 100);
+}
+
+TEST(SeedCells, WhatTheMapExplainsIsNotSeeded) {
+  const SeedingOptions options;
+  Scene scene(2.0);
+  scene.render_exactly();
+  EXPECT_TRUE(seed_cells(options, scene.view, kUnit, scene.render, kCell, options.min_color_error).empty());
+  // A block of another colour, and one that stands in front of the rendered surface.
+  for (int y = 8; y < 12; ++y) {
+    for (int x = 8; x < 12; ++x) {
+      for (int c = 0; c < 3; ++c) scene.view.color(x, y, c) = 255;
+      scene.view.depth(x + 16, y) = 1500;
+    }
+  }
+  const auto seeds = seed_cells(options, scene.view, kUnit, scene.render, kCell, options.min_color_error);
+  ASSERT_EQ(seeds.size(), 2u);
+  EXPECT_NEAR(seeds[0].mean[2], 2.0, 1e-6);
+  EXPECT_NEAR(seeds[1].mean[2], 1.5, 1e-6);
+}
+
+TEST(SeedCells, HolesTakeTheNearestDepthOnlyWhereNothingIsDrawn) {
+  const SeedingOptions options;
+  Scene scene(2.0);
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 0; x < 32; ++x) scene.view.depth(x, y) = 0;
+  }
+  EXPECT_EQ(seed_cells(options, scene.view, kUnit, scene.render, kCell, options.min_color_error).size(), 16u * 12u);
+  scene.render_exactly();
+  std::ranges::fill(scene.render.rgb, 0.0f);  // wrong colour everywhere
+  EXPECT_EQ(seed_cells(options, scene.view, kUnit, scene.render, kCell, options.min_color_error).size(), 8u * 12u);
+}
+
+TEST(SeedCells, WithoutAnyDepthThereIsNothingToSeed) {
+  Scene scene(2.0);
+  scene.view.depth = ImageU16(64, 48);
+  EXPECT_TRUE(seed_cells({}, scene.view, kUnit, scene.render, kCell, 0.1).empty());
+}
+
+TEST(SeedFeatures, OnlyPixelsThatLookWrongGetOne) {
+  const SeedingOptions options;
+  Scene scene(2.0);
+  scene.render_exactly();
+  const std::vector<DepthPixel> features = {{20.5f, 20.5f, 2.0f}, {80.5f, 60.5f, 2.0f}, {500.0f, 2.0f, 2.0f}};
+  EXPECT_TRUE(seed_features(options, scene.view, 2, scene.render, features).empty());
+  for (int c = 0; c < 3; ++c) scene.view.color(40, 30, c) = 255;  // where feature 1 lies in the half-size view
+  const auto seeds = seed_features(options, scene.view, 2, scene.render, features);
+  ASSERT_EQ(seeds.size(), 1u);
+  const double x = (80.5 + 0.5) / 2 - 0.5;
+  EXPECT_NEAR(seeds[0].mean[0], (x - 31) / 60 * 2.0, 1e-6);
+  EXPECT_NEAR(std::exp(seeds[0].log_scale[1]), options.feature_sigma_px / 2 * 2.0 / 60, 1e-5);
+}
+
+}  // namespace
+}  // namespace photoslam

@@ -1,0 +1,66 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "pipeline/stage.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <stdexcept>
+#include <vector>
+
+namespace photoslam {
+namespace {
+
+class StageTest : public ::testing::TestWithParam<bool> {
+ protected:
+  std::stop_source stop;
+  FailureReport failures{stop};
+};
+
+TEST_P(StageTest, HandlesEverythingInOrderBeforeItFinishes) {
+  std::vector<int> seen;
+  {
+    Stage<int> stage(3, GetParam(), {.name = "test", .handle = [&](int i) { seen.push_back(i); }}, failures);
+    for (int i = 0; i < 100; ++i) stage.post(i);
+    stage.finish();
+    EXPECT_EQ(seen.size(), 100u);
+  }
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(seen[static_cast<size_t>(i)], i);
+  EXPECT_FALSE(stop.stop_requested());
+}
+
+TEST_P(StageTest, AThrowingComponentIsNamedAndStopsThePipelineWithoutBlockingIt) {
+  int handled = 0;
+  Stage<int> stage(2, GetParam(),
+                   {.name = "geometry mapping",
+                    .handle =
+                        [&](int i) {
+                          if (i == 3) throw std::runtime_error("broken map");
+                          ++handled;
+                        }},
+                   failures);
+  for (int i = 0; i < 50; ++i) stage.post(i);
+  stage.finish();
+  EXPECT_EQ(handled, 3);
+  EXPECT_TRUE(stop.stop_requested());
+  EXPECT_EQ(failures.text(), "geometry mapping: broken map");
+}
+
+INSTANTIATE_TEST_SUITE_P(Threading, StageTest, ::testing::Bool(),
+                         [](const auto& suite) { return suite.param ? "OwnThread" : "Inline"; });
+
+TEST(Stage, WorksWhileIdleAndSleepsWhenThereIsNothingToDo) {
+  std::stop_source stop;
+  FailureReport failures{stop};
+  std::atomic<int> idle_calls = 0;
+  Stage<int> stage(2, true, {.name = "idle", .handle = [](int) {}, .idle = [&] { return ++idle_calls < 10; }},
+                   failures);
+  while (idle_calls < 10) std::this_thread::yield();
+  stage.post(1);  // wakes it: idle is asked once more
+  while (idle_calls < 11) std::this_thread::yield();
+  stage.finish();
+  EXPECT_LE(idle_calls, 12);
+}
+
+}  // namespace
+}  // namespace photoslam
