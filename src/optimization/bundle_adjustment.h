@@ -17,9 +17,9 @@ struct BundleProblem {
     int point = 0;
     PixelObservation pixel;
   };
-  std::vector<SE3> camera_from_world;   ///< [P], changed in place unless fixed.
-  std::vector<uint8_t> pose_is_fixed;   ///< [P]
-  std::vector<Vec3> points_in_world;    ///< [M], changed in place.
+  std::vector<SE3> camera_from_world;  ///< [P], changed in place unless fixed.
+  std::vector<uint8_t> pose_is_fixed;  ///< [P]
+  std::vector<Vec3> points_in_world;   ///< [M], changed in place.
   std::vector<Observation> observations;
 
   void clear();
@@ -59,7 +59,7 @@ class BundleAdjuster {
 };
 
 /// Squared normalised reprojection error (χ²) of one observation; infinite for a point behind the camera.
-double reprojection_chi2(const PinholeCamera& camera, double bf, const SE3& camera_from_world, const Vec3& point_in_world,
-                         const PixelObservation& observation);
+double reprojection_chi2(const PinholeCamera& camera, double bf, const SE3& camera_from_world,
+                         const Vec3& point_in_world, const PixelObservation& observation);
 
 }  // namespace photoslam

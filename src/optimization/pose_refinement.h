@@ -14,10 +14,10 @@
 namespace photoslam {
 
 struct PoseRefinementOptions {
-  int rounds = 4;               ///< Inliers are chosen anew after each round.
+  int rounds = 4;  ///< Inliers are chosen anew after each round.
   int iterations_per_round = 10;
-  double chi2_mono = 5.991;     ///< 95 % of χ² with 2 degrees of freedom.
-  double chi2_depth = 7.815;    ///< 95 % of χ² with 3 degrees of freedom.
+  double chi2_mono = 5.991;   ///< 95 % of χ² with 2 degrees of freedom.
+  double chi2_depth = 7.815;  ///< 95 % of χ² with 3 degrees of freedom.
   void visit(OptionVisitor& visitor);
 };
 
@@ -25,8 +25,8 @@ struct PoseRefinementResult {
   SE3 camera_from_world;
   std::vector<uint8_t> inlier;  ///< One per observation.
   int num_inliers = 0;
-  double cost = 0;              ///< ½ Σ ρ over the inliers of the last round.
-  bool converged = false;       ///< At least 4 inliers and a finite pose; otherwise the initial pose is returned.
+  double cost = 0;         ///< ½ Σ ρ over the inliers of the last round.
+  bool converged = false;  ///< At least 4 inliers and a finite pose; otherwise the initial pose is returned.
 };
 
 /// Motion-only bundle adjustment, Eq. (1) of Photo-SLAM: the pose that minimises the robust reprojection error of known
