@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/ids.h"
+#include "evaluation/statistics.h"
 #include "image/image.h"
 
 namespace photoslam {
@@ -35,9 +36,5 @@ FrameScore score_frame(FrameId frame, int64_t timestamp_ns, const ImageF& render
 
 /// All unset when there are no scores.
 ImageFigures summarize(const std::vector<FrameScore>& scores);
-
-/// Value below which the share `p` in [0, 1] of the values lies, interpolated linearly; the values may be unsorted and
-/// must not be empty.
-double percentile(std::vector<double> values, double p);
 
 }  // namespace photoslam

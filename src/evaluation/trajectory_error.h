@@ -22,7 +22,7 @@ struct AbsoluteError {
   double rmse_m = 0;
   double std_m = 0;
   double median_m = 0;
-  double rot_rmse_deg = 0;         ///< Of the rotation that is left after removing its mean over the trajectory.
+  double rot_rmse_deg = 0;         ///< Angle between the aligned and the true orientation.
   double scale = 1;                ///< Of the alignment; 1 unless asked for.
   size_t matched = 0;              ///< Pairs of poses compared.
   Similarity truth_from_estimate;  ///< The alignment of the worlds.
@@ -31,7 +31,7 @@ struct AbsoluteError {
 /// Nothing when fewer than three poses match.
 std::optional<AbsoluteError> absolute_error(const Trajectory& estimate, const Trajectory& truth, bool with_scale);
 
-/// Relative pose error: of the motion over `seconds`, root mean square over all start times.
+/// Relative pose error: of the motion over a time span, root mean square over all start times.
 struct RelativeError {
   double trans_m = 0;
   double rot_deg = 0;
