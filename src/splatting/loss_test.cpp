@@ -151,8 +151,7 @@ TEST_P(Loss, PixelsWithoutDataHaveNoGradient) {
   const Case c = make_case(40, 30, true, 10);
   std::vector<float> gradient;
   evaluate(c, 0.2f, gradient);
-  for (size_t i = 0; i < c.render.size(); ++i)
-    ASSERT_TRUE(c.mask[i % c.plane()] != 0 || gradient[i] == 0.0f) << i;
+  for (size_t i = 0; i < c.render.size(); ++i) ASSERT_TRUE(c.mask[i % c.plane()] != 0 || gradient[i] == 0.0f) << i;
 }
 
 TEST(DepthLoss, ComparesWithTheDepthThatTheOpacityAllows) {

@@ -22,15 +22,18 @@ namespace photoslam::splatting::HWY_NAMESPACE {
 /// Anything beyond this is taken for garbage and not drawn.
 inline constexpr float kAbsurd = 1e18f;
 
-HWY_INLINE void colors(const Block& block, const Lanes* offset, int degree, size_t lane, Lanes* rgb) {
+/// Colours seen from the camera, clamped at 0; returns which lanes are sane.
+HWY_INLINE LaneMask colors(const Block& block, const Lanes* offset, int degree, size_t lane, Lanes* rgb) {
   Lanes direction[3], basis[kNumShCoefficients];
   normalize(offset, direction);
   sh_basis(degree, direction, basis);
   for (int c = 0; c < 3; ++c) rgb[c] = Lanes(0.5f);
   for (int k = 0; k < num_sh_coefficients(degree); ++k)
     for (int c = 0; c < 3; ++c) rgb[c] = mul_add(basis[k], load(block.parameters[row::kSh + 3 * k + c] + lane), rgb[c]);
-  for (int c = 0; c < 3; ++c)
-    rgb[c] = select(rgb[c] > Lanes(0.0f), rgb[c], select(rgb[c] <= Lanes(0.0f), Lanes(0.0f), rgb[c]));
+  const Lanes absurd(kAbsurd);
+  const LaneMask ok = (absolute(rgb[0]) < absurd) & (absolute(rgb[1]) < absurd) & (absolute(rgb[2]) < absurd);
+  for (int c = 0; c < 3; ++c) rgb[c] = maximum(rgb[c], Lanes(0.0f));
+  return ok;
 }
 
 /// Projects one block into `splats` [64]; returns the lanes whose ellipse may touch a pixel. Not-a-number fails every
@@ -62,8 +65,7 @@ uint64_t project_block(const Block& block, const AnchorView& view, int width, in
     const size_t left = static_cast<size_t>(block.count) - lane;
     ok = ok & LaneMask{hn::FirstN(kFloats, std::min(left, kLanes))};
     if (hn::AllFalse(kFloats, ok.m)) continue;
-    colors(block, g.offset, degree, lane, rgb);
-    ok = ok & (rgb[0] < absurd) & (rgb[1] < absurd) & (rgb[2] < absurd);
+    ok = ok & colors(block, g.offset, degree, lane, rgb);
 
     store(g.u, rows[0] + lane);
     store(g.v, rows[1] + lane);
