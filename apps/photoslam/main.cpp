@@ -5,6 +5,8 @@
 int main(int argc, char** argv) {
   photoslam::CommandLine line;
   photoslam::add_run(line);
+  photoslam::add_eval(line);
+  photoslam::add_render(line);
   photoslam::add_doctor(line);
   photoslam::add_config(line);
   return line.run(argc, argv);
