@@ -54,7 +54,7 @@ void book(Workshop& w, const SE3& frame, double thickness, double depth, double 
   const uint32_t seed = w.seed();
   const bool lying = pose == BookPose::lying;
   const Finish finish{.gloss = w.random().uniform() < 0.4 ? 0.05f : 0.015f, .roughness = 0.25f};
-  const Cover spine(w.material(t, h, 700, book_spine(t, h, seed), finish), Cover::Fit::stretch, 0.05);
+  const Cover spine(w.material(t, h, 450, book_spine(t, h, seed), finish), Cover::Fit::stretch, 0.05);
   const Cover cover(w.material(d, h, lying ? 900 : 250, book_cover(d, h, seed), finish), Cover::Fit::stretch,
                     lying ? 0.02 : 0.08);
   const Cover paper(w.pages, Cover::Fit::random, 0.06);

@@ -10,14 +10,14 @@ void wall_things(Workshop& w, const Vec3& size) {
   const double north = size.y() - 0.004;
   const float board_width = 1.15f, board_height = 0.75f;
   const int board =
-      w.material(board_width, board_height, 900, pin_board(board_width, board_height, w.seed()), {.gloss = 0.01f});
+      w.material(board_width, board_height, 500, pin_board(board_width, board_height, w.seed()), {.gloss = 0.01f});
   BoxCovers covers(w.oak);
   covers.front = Cover(board, Cover::Fit::stretch, 0.03);
   w.mesh().box(place(2.1, north - 0.02, 1.28), Vec3(0, 0, 0), Vec3(board_width, 0.02, board_height), covers);
   framed_picture(w, place(3.68, north, 1.86), 0.42, 0.56, PictureKind::botanical, w.black);
   framed_picture(w, place(4.28, north, 1.62), 0.62, 0.46, PictureKind::landscape, w.oak);
   framed_picture(w, place(4.22, north, 2.14), 0.46, 0.34, PictureKind::shapes, w.white);
-  const int dial = w.material(0.3f, 0.3f, 900, clock_face(0.3f), {.gloss = 0.04f});
+  const int dial = w.material(0.3f, 0.3f, 500, clock_face(0.3f), {.gloss = 0.04f});
   const SE3 clock = place(3.64, north - 0.025, 1.36);
   w.mesh().box(clock, Vec3(-0.12, 0, -0.12), Vec3(0.24, 0.025, 0.24), [&] {
     BoxCovers c(w.brass);
@@ -44,7 +44,7 @@ void wall_things(Workshop& w, const Vec3& size) {
 
 void carpet(Workshop& w, const SE3& frame, double width, double depth) {
   const float fw = static_cast<float>(width), fd = static_cast<float>(depth);
-  const int wool = w.material(fw, fd, 600, rug(fw, fd, w.seed()), {.gloss = 0.005f});
+  const int wool = w.material(fw, fd, 450, rug(fw, fd, w.seed()), {.gloss = 0.005f});
   BoxCovers covers(w.linen);
   covers.top = Cover(wool, Cover::Fit::stretch, 0.02);
   w.mesh().box(frame, Vec3(0, 0, 0.0005), Vec3(width, depth, 0.009), covers);
@@ -78,7 +78,7 @@ void framed_picture(Workshop& w, const SE3& frame, double width, double height, 
                  Vec3(0, 0, -inner_height), Cover(w.white, Cover::Fit::random, 0.02));
   const double art_width = inner_width - 2 * mat, art_height = inner_height - 2 * mat;
   const float fw = static_cast<float>(art_width), fh = static_cast<float>(art_height);
-  const int art = w.material(fw, fh, 800, picture(kind, fw, fh, w.seed()), {.gloss = 0.03f, .roughness = 0.1f});
+  const int art = w.material(fw, fh, 500, picture(kind, fw, fh, w.seed()), {.gloss = 0.03f, .roughness = 0.1f});
   mesh.rectangle(frame, Vec3(-art_width / 2, -0.008, art_height / 2), Vec3(art_width, 0, 0), Vec3(0, 0, -art_height),
                  Cover(art, Cover::Fit::stretch, 0.02));
 }
@@ -105,7 +105,7 @@ RoomModel furnish_room(uint64_t seed, const Vec3& size, Executor& executor) {
   // North side.
   bookshelf(w, place(0.42, size.y() - 0.33, 0), 1.5, 2.0, 6);
   desk(w, place(2.05, size.y() - 0.76, 0));
-  const int seat = w.material(0.5f, 0.5f, 800, flowers(w.seed()), {.gloss = 0.005f});
+  const int seat = w.material(0.5f, 0.5f, 500, flowers(w.seed()), {.gloss = 0.005f});
   wooden_chair(w, place(2.98, 2.86, 0, 155), seat);
   sideboard(w, place(3.8, size.y() - 0.45, 0), 0.95);
   potted_plant(w, place(4.93, 3.62, 0), 0.34, 0.6, 30);

@@ -30,7 +30,7 @@ void throw_pillow(Workshop& w, const SE3& frame, double size, double lean_deg, i
 }  // namespace
 
 void sofa(Workshop& w, const SE3& frame, double width) {
-  const int cloth = w.material(1.3f, 1.3f, 700, tweed(rgb(0x4C6270), rgb(0x9FB0AE), w.seed()), {.gloss = 0.008f});
+  const int cloth = w.material(1.3f, 1.3f, 450, tweed(rgb(0x4C6270), rgb(0x9FB0AE), w.seed()), {.gloss = 0.008f});
   constexpr double kDepth = 0.92, kArm = 0.2, kLeg = 0.13, kSeat = 0.44;
   legs(w, frame, Vec3(width, kDepth, kLeg), 0.08, w.walnut, 0.025);
   padded_block(w, frame, Vec3(0.02, 0.02, kLeg), Vec3(width - 0.04, kDepth - 0.04, 0.17), 0.03, 0, cloth);
@@ -45,14 +45,14 @@ void sofa(Workshop& w, const SE3& frame, double width) {
     padded_block(w, frame, Vec3(x + 0.006, kDepth - 0.4, kSeat), Vec3(seat_width - 0.012, 0.2, 0.36), 0.07, 0.03,
                  cloth);
   }
-  const int striped = w.material(0.5f, 0.5f, 900, stripes(w.seed()), {.gloss = 0.005f});
-  const int dyed = w.material(0.5f, 0.5f, 900, ikat(w.seed()), {.gloss = 0.005f});
-  const int flowered = w.material(0.5f, 0.5f, 900, flowers(w.seed()), {.gloss = 0.005f});
+  const int striped = w.material(0.5f, 0.5f, 500, stripes(w.seed()), {.gloss = 0.005f});
+  const int dyed = w.material(0.5f, 0.5f, 500, ikat(w.seed()), {.gloss = 0.005f});
+  const int flowered = w.material(0.5f, 0.5f, 500, flowers(w.seed()), {.gloss = 0.005f});
   throw_pillow(w, frame * place(kArm + 0.2, 0.42, kSeat, 24), 0.44, -18, striped);
   throw_pillow(w, frame * place(kArm + 0.52, 0.4, kSeat, -6), 0.4, -22, dyed);
   throw_pillow(w, frame * place(width - kArm - 0.25, 0.42, kSeat, -20), 0.45, -18, flowered);
   // A knitted blanket hangs over the back and down to the seat.
-  const int wool = w.material(0.7f, 1.4f, 700, knit(rgb(0xB0603C), w.seed()), {.gloss = 0.004f});
+  const int wool = w.material(0.7f, 1.4f, 450, knit(rgb(0xB0603C), w.seed()), {.gloss = 0.004f});
   const double left = 0.5 * width - 0.02;
   w.mesh().patch(
       frame, 14, 24,
@@ -70,7 +70,7 @@ void sofa(Workshop& w, const SE3& frame, double width) {
 }
 
 void armchair(Workshop& w, const SE3& frame) {
-  const int hide = w.material(1.0f, 1.0f, 700, leather(rgb(0x9A5B33), w.seed()), {.gloss = 0.05f, .roughness = 0.2f});
+  const int hide = w.material(1.0f, 1.0f, 450, leather(rgb(0x9A5B33), w.seed()), {.gloss = 0.05f, .roughness = 0.2f});
   constexpr double kWidth = 0.78, kDepth = 0.8;
   legs(w, frame, Vec3(kWidth, kDepth, 0.15), 0.08, w.oak, 0.022);
   padded_block(w, frame, Vec3(0.0, 0.0, 0.15), Vec3(kWidth, kDepth, 0.16), 0.04, 0, hide);
@@ -79,7 +79,7 @@ void armchair(Workshop& w, const SE3& frame) {
   padded_block(w, frame, Vec3(0.14, -0.02, 0.3), Vec3(kWidth - 0.28, kDepth - 0.16, 0.15), 0.05, 0.025, hide);
   const SE3 back = frame * SE3(so3_exp(Vec3(-0.2, 0, 0)), Vec3(kWidth / 2, kDepth - 0.1, 0.62));
   w.mesh().rounded_box(back, Vec3(kWidth - 0.2, 0.17, 0.66), 0.07, 0.02, Cover(hide, Cover::Fit::random, 0.025));
-  const int cover = w.material(0.5f, 0.5f, 900, ikat(w.seed()), {.gloss = 0.005f});
+  const int cover = w.material(0.5f, 0.5f, 500, ikat(w.seed()), {.gloss = 0.005f});
   throw_pillow(w, frame * place(0.4, 0.44, 0.45, 8), 0.4, -20, cover);
 }
 

@@ -17,12 +17,12 @@ void walls(Workshop& w, const Vec3& size) {
   const float fx = static_cast<float>(x), fy = static_cast<float>(y), fz = static_cast<float>(z);
   const SE3 origin;
   const Cover::Fit fill = Cover::Fit::stretch;
-  const int floor = w.material(fx, fy, 450, parquet(w.seed()), {.gloss = 0.05f, .roughness = 0.12f});
-  const int brick = w.material(fx, fz, 450, brick_wall(w.seed()), {.gloss = 0.01f});
-  const int paper = w.material(fy, fz, 450, wallpaper(rgb(0xE2D9C2), w.seed()), {.gloss = 0.01f});
-  const int plastered = w.material(2.0f, 2.0f, 350, plaster(rgb(0xC9B592), w.seed()), {.gloss = 0.01f});
-  const int south = w.material(fx, fz, 350, plaster(rgb(0x9FAA98), w.seed()), {.gloss = 0.01f});
-  const int ceiling = w.material(2.0f, 2.0f, 250, plaster(rgb(0xE9E4DA), w.seed()), {.gloss = 0});
+  const int floor = w.material(fx, fy, 300, parquet(w.seed()), {.gloss = 0.05f, .roughness = 0.12f});
+  const int brick = w.material(fx, fz, 300, brick_wall(w.seed()), {.gloss = 0.01f});
+  const int paper = w.material(fy, fz, 300, wallpaper(rgb(0xE2D9C2), w.seed()), {.gloss = 0.01f});
+  const int plastered = w.material(2.0f, 2.0f, 220, plaster(rgb(0xC9B592), w.seed()), {.gloss = 0.01f});
+  const int south = w.material(fx, fz, 220, plaster(rgb(0x9FAA98), w.seed()), {.gloss = 0.01f});
+  const int ceiling = w.material(2.0f, 2.0f, 120, plaster(rgb(0xE9E4DA), w.seed()), {.gloss = 0});
 
   mesh.rectangle(origin, Vec3(0, y, 0), Vec3(x, 0, 0), Vec3(0, -y, 0), Cover(floor, fill, 0.02));
   mesh.rectangle(origin, Vec3(0, y, z), Vec3(x, 0, 0), Vec3(0, 0, -z), Cover(brick, fill, 0.03));

@@ -13,7 +13,7 @@ Cover fine(int material) { return {material, Cover::Fit::random, 0.012}; }
 
 int pottery(Workshop& w, const Color& ground, const Color& paint, double height) {
   const float h = static_cast<float>(height);
-  return w.material(std::max(0.2f, 2 * h), h, 900, glaze(ground, paint, h, w.seed()), kGlazed);
+  return w.material(std::max(0.2f, 2 * h), h, 500, glaze(ground, paint, h, w.seed()), kGlazed);
 }
 
 }  // namespace
@@ -116,9 +116,9 @@ void fruit_bowl(Workshop& w, const SE3& frame) {
   const Vec2 profile[] = {{0, 0.02},      {0.06, 0.025}, {0.11, 0.05},  {0.135, 0.085}, {0.135, 0.085}, {0.142, 0.085},
                           {0.142, 0.085}, {0.115, 0.04}, {0.06, 0.008}, {0.055, 0},     {0, 0}};
   w.mesh().lathe(frame, profile, Cover(clay, Cover::Fit::aligned, 0.01), 32);
-  const int apple = w.material(0.25f, 0.15f, 900, fruit(rgb(0xB3302A), rgb(0xC9A83C), w.seed()), kGlazed);
-  const int pear = w.material(0.25f, 0.15f, 900, fruit(rgb(0xA9A53A), rgb(0x7F8F35), w.seed()), kGlazed);
-  const int orange = w.material(0.25f, 0.15f, 900, fruit(rgb(0xE08A2A), rgb(0xD9742A), w.seed()), kGlazed);
+  const int apple = w.material(0.25f, 0.15f, 500, fruit(rgb(0xB3302A), rgb(0xC9A83C), w.seed()), kGlazed);
+  const int pear = w.material(0.25f, 0.15f, 500, fruit(rgb(0xA9A53A), rgb(0x7F8F35), w.seed()), kGlazed);
+  const int orange = w.material(0.25f, 0.15f, 500, fruit(rgb(0xE08A2A), rgb(0xD9742A), w.seed()), kGlazed);
   const int kinds[] = {apple, orange, pear, apple, orange, apple, pear};
   for (int i = 0; i < 7; ++i) {
     const double angle = 1.05 * i, ring = i == 6 ? 0.0 : 0.07;
@@ -128,7 +128,7 @@ void fruit_bowl(Workshop& w, const SE3& frame) {
 }
 
 void globe_on_stand(Workshop& w, const SE3& frame) {
-  const int map = w.material(0.66f, 0.33f, 900, globe(0.105f, w.seed()), {.gloss = 0.05f, .roughness = 0.15f});
+  const int map = w.material(0.66f, 0.33f, 500, globe(0.105f, w.seed()), {.gloss = 0.05f, .roughness = 0.15f});
   w.mesh().lathe(frame, std::vector<Vec2>{{0, 0.03}, {0.02, 0.03}, {0.09, 0.01}, {0.09, 0}, {0, 0}}, fine(w.walnut),
                  24);
   const SE3 axis = frame * SE3(so3_exp(Vec3(0, 0.41, 0)), Vec3(0, 0, 0.19));
@@ -180,7 +180,7 @@ void wicker_basket(Workshop& w, const SE3& frame, double radius, double height) 
 
 void printed_sheet(Workshop& w, const SE3& frame, double width, double height) {
   const float fw = static_cast<float>(width), fh = static_cast<float>(height);
-  const int page = w.material(fw, fh, 1100, printed_page(fw, fh, w.seed()), {.gloss = 0.02f});
+  const int page = w.material(fw, fh, 700, printed_page(fw, fh, w.seed()), {.gloss = 0.02f});
   w.mesh().patch(
       frame, 5, 5,
       [&](double u, double v) -> Vec3 {

@@ -15,7 +15,7 @@ void table_top(Workshop& w, const SE3& frame, const Vec3& corner, const Vec3& si
 
 void screen(Workshop& w, const SE3& frame, double width, double height) {
   MeshBuilder& mesh = w.mesh();
-  const int code = w.material(static_cast<float>(width), static_cast<float>(height), 1200,
+  const int code = w.material(static_cast<float>(width), static_cast<float>(height), 800,
                               code_editor(static_cast<float>(width), static_cast<float>(height), w.seed()),
                               {.gloss = 0.04f, .roughness = 0.08f, .emission = 0.55f});
   mesh.box(frame, Vec3(-width / 2 - 0.012, 0, 0.12), Vec3(width + 0.024, 0.03, height + 0.024), BoxCovers(w.black));
@@ -76,7 +76,7 @@ void desk(Workshop& w, const SE3& frame) {
 
   const SE3 top = frame * place(0, 0, kTop);
   screen(w, top * place(0.78, 0.45, 0, 4), 0.54, 0.32);
-  const int keys = w.material(0.44f, 0.14f, 1400, keyboard(0.44f, 0.14f, w.seed()), {.gloss = 0.04f});
+  const int keys = w.material(0.44f, 0.14f, 800, keyboard(0.44f, 0.14f, w.seed()), {.gloss = 0.04f});
   BoxCovers board(w.black);
   board.top = Cover(keys, Cover::Fit::stretch, 0.02);
   mesh.box(top * place(0.76, 0.2, 0, -3), Vec3(-0.22, -0.07, 0), Vec3(0.44, 0.14, 0.018), board);
@@ -115,7 +115,7 @@ void coffee_table(Workshop& w, const SE3& frame) {
   wicker_basket(w, frame * place(0.8, 0.32, 0.151), 0.16, 0.13);
   const SE3 top = frame * place(0, 0, kTop);
   // A tray of painted tiles with the tea things.
-  const int tile = w.material(0.42f, 0.3f, 1000, tiles(0.06f, w.seed()), {.gloss = 0.06f, .roughness = 0.1f});
+  const int tile = w.material(0.42f, 0.3f, 600, tiles(0.06f, w.seed()), {.gloss = 0.06f, .roughness = 0.1f});
   const SE3 tray = top * place(0.28, 0.32, 0, 7);
   BoxCovers covers(w.oak);
   covers.top = Cover(tile, Cover::Fit::stretch, 0.0125);
@@ -148,7 +148,7 @@ void cupboard(Workshop& w, const SE3& frame, double width) {
 }
 
 void tiled_stove(Workshop& w, const SE3& frame) {
-  const int tile = w.material(0.72f, 1.6f, 700, tiles(0.12f, w.seed()), {.gloss = 0.06f, .roughness = 0.1f});
+  const int tile = w.material(0.72f, 1.6f, 450, tiles(0.12f, w.seed()), {.gloss = 0.06f, .roughness = 0.1f});
   MeshBuilder& mesh = w.mesh();
   const BoxCovers covers(Cover(tile, Cover::Fit::aligned, 0.04));
   mesh.box(frame, Vec3(0, 0, 0.1), Vec3(0.72, 0.5, 0.95), covers);

@@ -8,19 +8,19 @@ namespace photoslam::synthetic {
 
 Workshop::Workshop(uint64_t seed) : mesh_(seed) {
   const Finish varnish{.gloss = 0.045f, .roughness = 0.18f};
-  oak = material(1.3f, 0.6f, 900, wood(rgb(0xCFA56E), rgb(0x8A5A32), this->seed()), varnish);
-  walnut = material(1.3f, 0.6f, 900, wood(rgb(0x8E6242), rgb(0x3E2618), this->seed()), varnish);
-  birch = material(1.3f, 0.6f, 700, wood(rgb(0xE2CBA2), rgb(0xB38B5C), this->seed()), varnish);
+  oak = material(1.3f, 0.6f, 500, wood(rgb(0xCFA56E), rgb(0x8A5A32), this->seed()), varnish);
+  walnut = material(1.3f, 0.6f, 500, wood(rgb(0x8E6242), rgb(0x3E2618), this->seed()), varnish);
+  birch = material(1.3f, 0.6f, 450, wood(rgb(0xE2CBA2), rgb(0xB38B5C), this->seed()), varnish);
   white = paint(rgb(0xE4DED2), {.gloss = 0.04f, .roughness = 0.2f});
   black = paint(rgb(0x26272A), {.gloss = 0.05f, .roughness = 0.15f});
   brass = material(0.3f, 0.3f, 500, metal(rgb(0xC49A50), this->seed()), {.gloss = 0.35f, .roughness = 0.15f});
   steel = material(0.3f, 0.3f, 500, metal(rgb(0x9BA0A6), this->seed()), {.gloss = 0.4f, .roughness = 0.12f});
-  pages = material(0.3f, 0.1f, 900, book_pages(this->seed()));
-  wicker = material(0.5f, 0.5f, 700, basket(this->seed()));
+  pages = material(0.3f, 0.1f, 500, book_pages(this->seed()));
+  wicker = material(0.5f, 0.5f, 450, basket(this->seed()));
   clay = material(0.5f, 0.3f, 500, terracotta(this->seed()));
-  leaf_dark = material(0.1f, 0.3f, 700, leaf_blade(rgb(0x3A6236), this->seed()),
+  leaf_dark = material(0.1f, 0.3f, 450, leaf_blade(rgb(0x3A6236), this->seed()),
                        {.gloss = 0.05f, .roughness = 0.15f, .translucency = 0.5f});
-  leaf_light = material(0.1f, 0.3f, 700, leaf_blade(rgb(0x6F8F45), this->seed()),
+  leaf_light = material(0.1f, 0.3f, 450, leaf_blade(rgb(0x6F8F45), this->seed()),
                         {.gloss = 0.05f, .roughness = 0.15f, .translucency = 0.5f});
   linen = material(0.8f, 1.6f, 500, curtain(rgb(0xE2D8C4), this->seed()), {.gloss = 0, .translucency = 0.5f});
 }

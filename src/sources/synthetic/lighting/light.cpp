@@ -27,23 +27,35 @@ std::pair<Vec3f, Vec3f> orthogonal_axes(const Vec3f& n) {
   return {Vec3f(1 + sign * n.x() * n.x() * a, sign * b, -sign * n.x()), Vec3f(b, sign + n.y() * n.y() * a, -n.y())};
 }
 
-/// Stratum i of side², shifted by a random amount that wraps around; in [0, 1)².
-Vec2f stratified(int i, int side, uint32_t seed) {
-  const float x = (static_cast<float>(i % side) + 0.5f) / static_cast<float>(side) + hash01(1, 0, seed);
-  const float y = (static_cast<float>(i / side) + 0.5f) / static_cast<float>(side) + hash01(2, 0, seed);
-  return {x - std::floor(x), y - std::floor(y)};
+/// Stratum i of the square [-1, 1]², shifted by a random amount that wraps around.
+Vec2f on_square(int i, uint32_t seed) {
+  const float x = (static_cast<float>(i % kSide) + 0.5f) / kSide + hash01(1, 0, seed);
+  const float y = (static_cast<float>(i / kSide) + 0.5f) / kSide + hash01(2, 0, seed);
+  return {2 * (x - std::floor(x)) - 1, 2 * (y - std::floor(y)) - 1};
 }
 
-/// A point of the unit disc, area preserving.
-Vec2f on_disc(const Vec2f& p) {
-  const float r = std::sqrt(p.x()), angle = 2 * kPi * p.y();
-  return {r * std::cos(angle), r * std::sin(angle)};
+/// count² points spread evenly over the unit disc. Source: Shirley and Chiu, "A low distortion map between disk and
+/// square", 1997.
+std::vector<Vec2f> disc_points(int count) {
+  std::vector<Vec2f> points;
+  for (int i = 0; i < count * count; ++i) {
+    const float a = 2 * (static_cast<float>(i % count) + 0.5f) / static_cast<float>(count) - 1;
+    const float b = 2 * (static_cast<float>(i / count) + 0.5f) / static_cast<float>(count) - 1;
+    const bool wide = std::abs(a) > std::abs(b);
+    const float r = wide ? a : b, angle = wide ? kPi / 4 * (b / a) : kPi / 2 - kPi / 4 * (a / b);
+    points.push_back({r * std::cos(angle), r * std::sin(angle)});
+  }
+  return points;
 }
+
+/// A turn by a random angle.
+Eigen::Matrix2f random_turn(uint32_t seed) { return Eigen::Rotation2Df(2 * kPi * hash01(3, 0, seed)).toRotationMatrix(); }
 
 /// Gathers the light that arrives at one point of a surface.
 class Gatherer {
  public:
-  Gatherer(const RayTracer& tracer, const Lights& lights) : tracer_(tracer), lights_(lights) {}
+  Gatherer(const RayTracer& tracer, const Lights& lights)
+      : tracer_(tracer), lights_(lights), disc_(disc_points(kSide)), hemisphere_(disc_points(kBounceSide)) {}
 
   /// Irradiance / π from the lights; the fourth value is the visible share of the first one.
   Color direct(const Mesh::Surface& surface, uint32_t seed) const {
@@ -63,11 +75,12 @@ class Gatherer {
     RayTracer::Rays rays;
     RayTracer::Hits hits;
     rays.origin = surface.position + kSurfaceOffset * surface.normal;
+    const Eigen::Matrix2f turn = random_turn(seed);
     Color sum = Color::Zero();
     constexpr int kTotal = kBounceSide * kBounceSide;
     for (int first = 0; first < kTotal; first += RayTracer::kRays) {
       for (int i = 0; i < RayTracer::kRays; ++i) {
-        const Vec2f d = on_disc(stratified(first + i, kBounceSide, seed));
+        const Vec2f d = turn * hemisphere_[static_cast<size_t>(first + i)];
         const float up = std::sqrt(std::max(1e-4f, 1 - d.squaredNorm()));
         rays.set(i, d.x() * tangent + d.y() * bitangent + up * surface.normal);
       }
@@ -83,11 +96,11 @@ class Gatherer {
   std::pair<Color, float> from_area(const AreaLight& light, const Mesh::Surface& surface, uint32_t seed) const {
     RayTracer::Rays rays;
     rays.origin = surface.position + kSurfaceOffset * surface.normal;
+    const Eigen::Matrix2f turn = light.is_ball() ? random_turn(seed) : Eigen::Matrix2f::Identity();
     std::array<float, RayTracer::kRays> weights{};
     bool any = false;
     for (int i = 0; i < RayTracer::kRays; ++i) {
-      const Vec2f p = stratified(i, kSide, seed);
-      const Vec2f ab = light.is_ball() ? on_disc(p) : Vec2f(2 * p.x() - 1, 2 * p.y() - 1);
+      const Vec2f ab = light.is_ball() ? Vec2f(turn * disc_[static_cast<size_t>(i)]) : on_square(i, seed);
       const Vec3f to = light.point(ab.x(), ab.y(), surface.position) - rays.origin;
       const float distance2 = to.squaredNorm(), distance = std::sqrt(distance2);
       const float cosine = surface.normal.dot(to) / distance;
@@ -120,8 +133,9 @@ class Gatherer {
     const auto [a, b] = orthogonal_axes(sun.towards);
     RayTracer::Rays rays;
     rays.origin = surface.position + kSurfaceOffset * surface.normal;
+    const Eigen::Matrix2f turn = random_turn(seed);
     for (int i = 0; i < RayTracer::kRays; ++i) {
-      const Vec2f d = sun.radius * on_disc(stratified(i, kSide, seed));
+      const Vec2f d = sun.radius * (turn * disc_[static_cast<size_t>(i)]);
       rays.set(i, sun.towards + d.x() * a + d.y() * b);
     }
     const int open = RayTracer::kRays - std::popcount(tracer_.blocked(rays));
@@ -130,6 +144,7 @@ class Gatherer {
 
   const RayTracer& tracer_;
   const Lights& lights_;
+  std::vector<Vec2f> disc_, hemisphere_;
 };
 
 /// Node (i, j) of a grid over the patch, kept a little away from the edges, where other surfaces touch.

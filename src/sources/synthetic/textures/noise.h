@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 
@@ -39,11 +40,14 @@ inline float fraction(float x) { return x - static_cast<float>(floor_int(x)); }
 inline float noise(float x, float y, uint32_t seed) {
   const int ix = floor_int(x), iy = floor_int(y);
   const float fx = x - static_cast<float>(ix), fy = y - static_cast<float>(iy);
+  // One of eight directions per corner, chosen without branches: the bits are random.
   const auto corner = [&](int dx, int dy) {
     const uint32_t h = hash(ix + dx, iy + dy, seed);
     const float px = fx - static_cast<float>(dx), py = fy - static_cast<float>(dy);
-    const float a = (h & 1) ? px : -px, b = (h & 2) ? py : -py;
-    return (h & 4) ? a + 0.5f * b : b + 0.5f * a;
+    const float a = std::bit_cast<float>(std::bit_cast<uint32_t>(px) ^ (h << 31));
+    const float b = std::bit_cast<float>(std::bit_cast<uint32_t>(py) ^ (h >> 1 << 31));
+    const float tilt = 0.5f * static_cast<float>(static_cast<int>(h >> 2 & 1));
+    return (1 - tilt) * a + (0.5f + tilt) * b;
   };
   const float u = fx * fx * fx * (fx * (fx * 6 - 15) + 10), v = fy * fy * fy * (fy * (fy * 6 - 15) + 10);
   return 1.25f * lerp(lerp(corner(0, 0), corner(1, 0), u), lerp(corner(0, 1), corner(1, 1), u), v);
