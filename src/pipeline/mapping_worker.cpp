@@ -18,11 +18,10 @@ void MappingWorker::freeze_if_due() {
 
 void MappingWorker::handle(MappingMessage message) {
   freeze_if_due();
-  if (const auto* update = std::get_if<MapUpdate>(&message)) {
-    mapper_.add_keyframe(*update->map, update->keyframe, *update->images, executor_);
-  } else {
-    train(std::get<TrainingBudget>(message).iterations);
+  if (message.update.map) {
+    mapper_.add_keyframe(*message.update.map, message.update.keyframe, *message.update.images, executor_);
   }
+  train(message.iterations);
   gaussians = mapper_.gaussians().size();
   cpu_seconds = thread_cpu_seconds();
 }

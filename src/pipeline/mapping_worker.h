@@ -4,7 +4,6 @@
 
 #include <atomic>
 #include <memory>
-#include <variant>
 
 #include "base/executor.h"
 #include "pipeline/frame_feed.h"
@@ -19,12 +18,11 @@ struct MapUpdate {
   std::shared_ptr<const KeyframeImages> images;
 };
 
-/// By logical time: train so many iterations now.
-struct TrainingBudget {
-  int iterations = 0;
+/// What photorealistic mapping is asked to do: first take over the keyframe, if there is one, then train.
+struct MappingMessage {
+  MapUpdate update;    ///< Without a map: no keyframe.
+  int iterations = 0;  ///< By logical time: so many, now.
 };
-
-using MappingMessage = std::variant<MapUpdate, TrainingBudget>;
 
 /// Runs photorealistic mapping behind a message queue, freezes the map that counts as the online result, and keeps the
 /// figures that others may read at any time.

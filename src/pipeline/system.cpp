@@ -127,7 +127,7 @@ void Session::deliver(MapUpdate update) {
     if (logical_time_) updates_.push_back(update);
   }
   update_arrived_.notify_all();
-  if (!logical_time_) mapping_stage_.post(std::move(update));
+  if (!logical_time_) mapping_stage_.post({std::move(update)});
 }
 
 void Session::receive_due_updates() {
@@ -147,7 +147,7 @@ void Session::receive_due_updates() {
     update_due_.pop_front();
     lock.unlock();
     visible_map_ = update.map;
-    mapping_stage_.post(std::move(update));
+    mapping_stage_.post({std::move(update)});
   }
 }
 
@@ -171,7 +171,7 @@ void Session::localize(FedFrame fed) {
     update_due_.push_back(frame_number_ + options_.pipeline.keyframe_lag_frames);
     geometry_stage_.post(std::move(*keyframe));
   }
-  if (logical_time_) mapping_stage_.post(TrainingBudget{options_.pipeline.iterations_per_frame});
+  if (logical_time_) mapping_stage_.post({.update = {}, .iterations = options_.pipeline.iterations_per_frame});
   ++frame_number_;
 }
 
