@@ -7,6 +7,9 @@ namespace photoslam::splatting {
 inline constexpr int kMaxShDegree = 3;
 inline constexpr int kNumShCoefficients = 16;
 
+/// Gaussians with a parameter, colour or size beyond this (or not a number) are garbage: never drawn, never trained.
+inline constexpr float kAbsurd = 1e18f;
+
 /// Number of spherical-harmonic coefficients per colour channel of a degree in [0, 3].
 constexpr int num_sh_coefficients(int degree) { return (degree + 1) * (degree + 1); }
 

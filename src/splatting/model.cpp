@@ -122,8 +122,9 @@ void GaussianModel::update_bounds(size_t index) {
     float low = kInfinity, high = -kInfinity;
     const float* means = block.parameters[row::kMean + i];
     for (int lane = 0; lane < block.count; ++lane) {
-      low = means[lane] < low ? means[lane] : low;
-      high = means[lane] > high ? means[lane] : high;
+      if (!(std::abs(means[lane]) < kAbsurd)) continue;
+      low = std::min(low, means[lane]);
+      high = std::max(high, means[lane]);
     }
     block.center[i] = low <= high ? 0.5f * low + 0.5f * high : 0.0f;
     radius2 += low <= high ? (high - block.center[i]) * (high - block.center[i]) : 0.0f;

@@ -40,7 +40,7 @@ struct alignas(64) Block {
   uint32_t births[kBlockSize];
   int32_t anchor;
   int32_t count;
-  float center[3];  ///< Bounding sphere of the finite means, in the anchor frame [m].
+  float center[3];  ///< Bounding sphere of the sane means, in the anchor frame [m].
   float radius;     ///< [m]
   float max_scale;  ///< Largest standard deviation in the block [m].
 };

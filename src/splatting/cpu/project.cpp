@@ -19,9 +19,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace photoslam::splatting::HWY_NAMESPACE {
 
-/// Anything beyond this is taken for garbage and not drawn.
-inline constexpr float kAbsurd = 1e18f;
-
 /// Colours seen from the camera, clamped at 0; returns which lanes are sane.
 HWY_INLINE LaneMask colors(const Block& block, const Lanes* offset, int degree, size_t lane, Lanes* rgb) {
   Lanes direction[3], basis[kNumShCoefficients];
@@ -59,7 +56,9 @@ uint64_t project_block(const Block& block, const AnchorView& view, int width, in
 
     const Lanes zero(0.0f), absurd(kAbsurd);
     LaneMask ok = (g.p[2] > Lanes(view.near)) & (g.p[2] < absurd) & (cut > zero) & (g.a < absurd) & (g.c < absurd) &
-                  (g.det > zero) & (inv_det > zero) & (g.u + extent_x >= zero) & (g.v + extent_y >= zero) &
+                  (g.inv_norm > Lanes(1.0f / kAbsurd)) & (absolute(log_scale[0]) < absurd) &
+                  (absolute(log_scale[1]) < absurd) & (absolute(log_scale[2]) < absurd) & (g.det > zero) &
+                  (inv_det > zero) & (g.u + extent_x >= zero) & (g.v + extent_y >= zero) &
                   (g.u - extent_x <= Lanes(static_cast<float>(width - 1))) &
                   (g.v - extent_y <= Lanes(static_cast<float>(height - 1)));
     const size_t left = static_cast<size_t>(block.count) - lane;
@@ -141,16 +140,15 @@ bool block_in_view(const Block& block, const AnchorView& view, const Frame& fram
   const float radius = block.radius * 1.0001f;
   if (p[2] + radius <= view.near) return false;
   constexpr float kReach = 3.331f, kMargin = 2.0f;
-  const auto inside = [&](float f, float center, float size, float position, float low, float high) {
+  const auto outside = [&](float f, float center, float size, float position, float low, float high) {
     const float bound = std::max(std::abs(low), std::abs(high));
     const float reach = kReach * f * std::sqrt(1 + bound * bound) * block.max_scale;
     const float before = center + kMargin, after = size - 1 - center + kMargin;
-    return f * position + before * p[2] + reach + radius * std::hypot(f, before) >= 0 &&
-           -f * position + after * p[2] + reach + radius * std::hypot(f, after) >= 0;
+    return f * position + before * p[2] + reach + radius * std::hypot(f, before) < 0 ||
+           -f * position + after * p[2] + reach + radius * std::hypot(f, after) < 0;
   };
-  // The negation keeps blocks whose bounds are not finite.
-  return !(!inside(view.fx, view.cx, static_cast<float>(frame.width), p[0], view.min_x, view.max_x) ||
-           !inside(view.fy, view.cy, static_cast<float>(frame.height), p[1], view.min_y, view.max_y));
+  return !outside(view.fx, view.cx, static_cast<float>(frame.width), p[0], view.min_x, view.max_x) &&
+         !outside(view.fy, view.cy, static_cast<float>(frame.height), p[1], view.min_y, view.max_y);
 }
 
 /// Calls emit(tile) for the tiles with a pixel inside the splat's cut ellipse, row by row.
