@@ -12,7 +12,7 @@ namespace photoslam {
 namespace {
 
 int64_t frame_time_ns(const SyntheticOptions& options, int index) {
-  return std::llround(index * 1e9 / options.frames_per_second);
+  return static_cast<int64_t>(index * 1e9 / options.frames_per_second);
 }
 
 SE3 frame_pose(const SyntheticOptions& options, const RoomTrajectory& trajectory, int index) {

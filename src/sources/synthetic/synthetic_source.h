@@ -22,7 +22,7 @@ class SyntheticCamera {
   SyntheticCamera(std::shared_ptr<const SyntheticRoom> room, const SyntheticOptions& options);
 
   const SyntheticOptions& options() const { return options_; }
-  /// Nearest nanosecond to index / frames_per_second.
+  /// index / frames_per_second, rounded down to nanoseconds.
   int64_t timestamp_ns(int index) const;
   SE3 world_from_camera(int index) const;
   /// The ideal view of a frame: no noise, no holes, no exposure drift.

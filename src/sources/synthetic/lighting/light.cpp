@@ -49,7 +49,9 @@ std::vector<Vec2f> disc_points(int count) {
 }
 
 /// A turn by a random angle.
-Eigen::Matrix2f random_turn(uint32_t seed) { return Eigen::Rotation2Df(2 * kPi * hash01(3, 0, seed)).toRotationMatrix(); }
+Eigen::Matrix2f random_turn(uint32_t seed) {
+  return Eigen::Rotation2Df(2 * kPi * hash01(3, 0, seed)).toRotationMatrix();
+}
 
 /// Gathers the light that arrives at one point of a surface.
 class Gatherer {
