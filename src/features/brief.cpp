@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "features/brief.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -14,6 +15,24 @@ constexpr int kSide = 2 * kPatchRadius + 1;
 
 bool in_disc(int x, int y) { return x * x + y * y <= kPatchRadius * kPatchRadius; }
 
+/// What corners have in common once they are turned upright: grey levels rise along x, near the keypoint as well as
+/// over the whole disc, the middle differs from its surroundings, and the two axes differ. A test that answers to one
+/// of these says little about which corner it is. The values are weights of the pixel at (x, y).
+constexpr int kNumCommonTraits = 4;
+double common_trait(int trait, int x, int y) {
+  const int squared = x * x + y * y;
+  switch (trait) {
+    case 0:
+      return x;
+    case 1:
+      return squared <= 64 ? x : 0;
+    case 2:
+      return squared <= 25 ? 1 : 0;
+    default:
+      return x * x - y * y;
+  }
+}
+
 /// Second-order statistics of a patch of a natural image: E (I(p) − I(q))² = D(p − q) grows like the distance beyond
 /// the width of the blur.
 class PatchModel {
@@ -22,13 +41,12 @@ class PatchModel {
     for (int y = 0; y < kTableSide; ++y) {
       for (int x = 0; x < kTableSide; ++x) structure_[y][x] = std::sqrt(x * x + y * y + kBlur * kBlur) - kBlur;
     }
-    for (int py = -kPatchRadius; py <= kPatchRadius; ++py) {
-      for (int px = -kPatchRadius; px <= kPatchRadius; ++px) {
-        if (!in_disc(px, py)) continue;
-        moment_covariance_[py + kPatchRadius][px + kPatchRadius] = covariance_with_moment(px, py);
-        moment_variance_ += px * moment_covariance_[py + kPatchRadius][px + kPatchRadius];
+    for (int y = -kPatchRadius; y <= kPatchRadius; ++y) {
+      for (int x = -kPatchRadius; x <= kPatchRadius; ++x) {
+        if (in_disc(x, y)) disc_.push_back({x, y});
       }
     }
+    for (int i = 0; i < kNumCommonTraits; ++i) traits_[i] = make_trait(i);
   }
 
   /// Correlation of I(a1) − I(b1) with I(a2) − I(b2).
@@ -38,37 +56,52 @@ class PatchModel {
     return covariance / std::sqrt(variance(s) * variance(t));
   }
 
-  /// Correlation of I(a) − I(b) with the first moment along x, which orientation makes positive.
-  double correlation_with_orientation(const BriefTest& t) const {
-    const double covariance = moment_covariance_[t.ay + kPatchRadius][t.ax + kPatchRadius] -
-                              moment_covariance_[t.by + kPatchRadius][t.bx + kPatchRadius];
-    return covariance / std::sqrt(variance(t) * moment_variance_);
+  /// Largest absolute correlation of I(a) − I(b) with a common trait.
+  double correlation_with_traits(const BriefTest& t) const {
+    double largest = 0;
+    for (const Trait& trait : traits_) {
+      const double covariance = trait.covariance[t.ay + kPatchRadius][t.ax + kPatchRadius] -
+                                trait.covariance[t.by + kPatchRadius][t.bx + kPatchRadius];
+      largest = std::max(largest, std::abs(covariance) / std::sqrt(variance(t) * trait.variance));
+    }
+    return largest;
   }
 
  private:
   static constexpr int kTableSide = 2 * kSide;
   static constexpr double kBlur = 2.0;
+  struct Pixel {
+    int x, y;
+  };
+  struct Trait {
+    double covariance[kSide][kSide] = {};  // With the grey level at a pixel, up to a constant.
+    double variance = 0;
+  };
 
+  Trait make_trait(int index) const {
+    double mean = 0;
+    for (const Pixel& p : disc_) mean += common_trait(index, p.x, p.y) / static_cast<double>(disc_.size());
+    Trait trait;
+    for (const Pixel& p : disc_) {
+      double sum = 0;
+      for (const Pixel& q : disc_)
+        sum -= 0.5 * (common_trait(index, q.x, q.y) - mean) * structure(p.x - q.x, p.y - q.y);
+      trait.covariance[p.y + kPatchRadius][p.x + kPatchRadius] = sum;
+      trait.variance += (common_trait(index, p.x, p.y) - mean) * sum;
+    }
+    return trait;
+  }
   double structure(int dx, int dy) const { return structure_[std::abs(dy)][std::abs(dx)]; }
   double variance(const BriefTest& t) const { return structure(t.ax - t.bx, t.ay - t.by); }
-  double covariance_with_moment(int px, int py) const {
-    double sum = 0;
-    for (int y = -kPatchRadius; y <= kPatchRadius; ++y) {
-      for (int x = -kPatchRadius; x <= kPatchRadius; ++x) {
-        if (in_disc(x, y)) sum -= 0.5 * x * structure(px - x, py - y);
-      }
-    }
-    return sum;
-  }
 
   double structure_[kTableSide][kTableSide];
-  double moment_covariance_[kSide][kSide] = {};
-  double moment_variance_ = 0;
+  std::vector<Pixel> disc_;
+  Trait traits_[kNumCommonTraits];
 };
 
 /// A random test: both ends roughly normal around the keypoint, inside the disc, a few pixels apart.
 BriefTest random_test(Random& random) {
-  // The sum of three uniform integers; unlike a normal deviate it needs no function that differs between platforms.
+  // The sum of two uniform integers; unlike a normal deviate it needs no function that differs between platforms.
   const auto coordinate = [&random] { return random.index(16) + random.index(16) - 15; };
   while (true) {
     const int ax = coordinate(), ay = coordinate(), bx = coordinate(), by = coordinate();
@@ -83,13 +116,13 @@ BriefTest random_test(Random& random) {
 
 BriefPattern make_brief_pattern() {
   constexpr size_t kCandidates = 4000;
-  constexpr double kMaxOrientationCorrelation = 0.3;
+  constexpr double kMaxTraitCorrelation = 0.3;
   const PatchModel model;
   Random random(256);
   std::vector<BriefTest> candidates;
   while (candidates.size() < kCandidates) {
     const BriefTest test = random_test(random);
-    if (std::abs(model.correlation_with_orientation(test)) <= kMaxOrientationCorrelation) candidates.push_back(test);
+    if (model.correlation_with_traits(test) <= kMaxTraitCorrelation) candidates.push_back(test);
   }
   BriefPattern pattern;
   size_t count = 0;

@@ -25,7 +25,7 @@ using BriefPattern = std::array<BriefTest, 256>;
 
 /// The 256 tests, the same on every machine (descriptors are stored in maps). They are drawn from a seeded generator
 /// and chosen greedily so that, for images whose grey levels differ by a variance proportional to distance (a common
-/// model of natural images), the bits are nearly uncorrelated with each other and with the patch's orientation.
+/// model of natural images), the bits are nearly uncorrelated with each other and with what all corners have in common.
 BriefPattern make_brief_pattern();
 
 /// Direction [rad] in [0, 2π), x towards y, from the pixel to the intensity centroid of the disc around it (Rosin
