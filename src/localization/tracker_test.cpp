@@ -89,7 +89,7 @@ TEST_F(TrackerTest, ToleratesNoiseAndWrongMatches) {
     ASSERT_TRUE(result.has_pose) << "frame " << frame << ": " << result.reason;
     sum += std::pow(pose_error(result.camera_from_world, truth).position, 2);
   }
-  // Several hundred points at 3 m and 0.7 px fix the position to a few millimetres.
+  // Several hundred points at 3 m and about 1 px fix the position to a few millimetres.
   EXPECT_LT(std::sqrt(sum / 90), 0.006);
 }
 

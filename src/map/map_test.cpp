@@ -121,8 +121,9 @@ TEST_F(MapTest, ViewOfALandmarkFollowsItsObservers) {
   const LandmarkId id = map.add_landmark(position, KeyframeId(0), 0);
   const LandmarkView& view = map.landmark(id).view;
   EXPECT_LT((view.normal - position.normalized()).norm(), 1e-12) << "seen from the origin";
-  EXPECT_NEAR(view.max_distance, position.norm(), 1e-12) << "octave 0 is the nearest that fits";
-  EXPECT_NEAR(view.min_distance, position.norm() / std::pow(1.2, kLevels - 1), 1e-12);
+  const int octave = map.keyframe(KeyframeId(0)).frame->features.keypoints[0].octave;
+  EXPECT_NEAR(view.max_distance, position.norm() * std::pow(1.2, octave), 1e-12) << "there it appears on octave 0";
+  EXPECT_NEAR(view.min_distance, view.max_distance / std::pow(1.2, kLevels - 1), 1e-12);
   EXPECT_EQ(view.descriptor, map.keyframe(KeyframeId(0)).frame->features.descriptors[0]);
 }
 

@@ -65,7 +65,13 @@ ShRotation::ShRotation(const Mat3& rotation) {
   // A turned function is a combination of basis functions of the same degree; 64 directions determine it exactly.
   // Σ c'_k Y_k(d) = Σ c_k Y_k(Rᵀ d) for all d.
   const Basis fixed = basis_at_directions(Mat3::Identity());
-  matrix_ = (fixed.transpose() * fixed).ldlt().solve(fixed.transpose() * basis_at_directions(rotation.transpose()));
+  const Eigen::Matrix<double, 16, 16> least_squares =
+      (fixed.transpose() * fixed).ldlt().solve(fixed.transpose() * basis_at_directions(rotation.transpose()));
+  matrix_.setZero();  // degrees do not mix
+  for (int degree = 0; degree <= splatting::kMaxShDegree; ++degree) {
+    const int first = degree * degree, size = 2 * degree + 1;
+    matrix_.block(first, first, size, size) = least_squares.block(first, first, size, size);
+  }
 }
 
 void ShRotation::apply(float (&sh)[splatting::kNumShCoefficients][3]) const {

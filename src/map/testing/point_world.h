@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -13,16 +14,19 @@
 namespace photoslam::testing {
 
 /// A world of points on the walls of a box around the origin, each with a descriptor of its own, for tests of tracking
-/// and mapping without images: features are exact projections, with the noise asked for.
+/// and mapping without images: features are exact projections, with the noise asked for. As in real images, a nearer
+/// point appears on a coarser octave, where positions are less exact.
 class PointWorld {
  public:
   static constexpr double kScaleFactor = 1.2;
+  static constexpr int kNumLevels = 8;
+  static constexpr double kFarthest = 5.5;  ///< Distance [m] of points that appear on octave 0.
   PinholeCamera camera{640, 480, 525, 525, 321.5, 238.25};
   double bf = 42;
-  double pixel_noise = 0;  ///< σ [px]
+  double pixel_noise = 0;  ///< σ [px] on octave 0
   double wrong_share = 0;  ///< Features displaced at random.
 
-  explicit PointWorld(uint64_t seed = 1, int num_points = 3000) : random_(seed) {
+  explicit PointWorld(uint64_t seed = 1, int num_points = 10000) : random_(seed) {
     for (int i = 0; i < num_points; ++i) {
       Vec3 p(random_.uniform(-3, 3), random_.uniform(-2, 2), random_.uniform(-3, 3));
       const int axis = random_.index(3);
@@ -34,7 +38,7 @@ class PointWorld {
     }
   }
 
-  /// What a camera sees: RGB-D features of octave 0, in random order.
+  /// What a camera sees, with depth.
   std::shared_ptr<const FeatureFrame> observe(const SE3& camera_from_world, int id, double frames_per_second = 30) {
     auto frame = std::make_shared<FeatureFrame>();
     frame->frame = FrameId(id);
@@ -45,15 +49,19 @@ class PointWorld {
       if (x.z() < 0.3 || !camera.contains(camera.project(x), 10)) continue;
       Vec2 pixel = camera.project(x);
       const double z = x.z();
-      if (pixel_noise > 0) pixel += pixel_noise * Vec2(random_.normal(), random_.normal());
+      const int octave = std::clamp(
+          static_cast<int>(std::lround(std::log(kFarthest / x.norm()) / std::log(kScaleFactor))), 0, kNumLevels - 1);
+      const double scale = std::pow(kScaleFactor, octave);
+      if (pixel_noise > 0) pixel += scale * pixel_noise * Vec2(random_.normal(), random_.normal());
       if (random_.uniform() < wrong_share) pixel += Vec2(random_.uniform(-9, 9), random_.uniform(-9, 9));
       Keypoint keypoint;
       keypoint.x = static_cast<float>(pixel.x());
       keypoint.y = static_cast<float>(pixel.y());
+      keypoint.octave = octave;
       frame->features.keypoints.push_back(keypoint);
       frame->features.descriptors.push_back(descriptors[i]);
       frame->depth.push_back(static_cast<float>(z));
-      frame->observations.push_back({pixel, pixel.x() - bf / z, 1.0});
+      frame->observations.push_back({pixel, pixel.x() - bf / z, 1.0 / (scale * scale)});
       point_of_keypoint.push_back(static_cast<int>(i));
     }
     frame->grid.build(frame->features.keypoints, camera.width, camera.height);
