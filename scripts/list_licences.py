@@ -20,6 +20,14 @@ each package's copyright file under /usr/share/doc, which has the last word: it 
 """
 
 
+# The free-form copyright files of the language run-times name the licences of every part; these are the linked ones.
+RUN_TIMES = {
+    "libc6": "LGPL-2.1-or-later",
+    "libgcc-s1": "GPL-3.0-or-later with the GCC Runtime Library Exception",
+    "libstdc++6": "GPL-3.0-or-later with the GCC Runtime Library Exception",
+}
+
+
 def run(*command):
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
@@ -43,6 +51,8 @@ def package_of(path):
 
 def licences_of(package):
     """Short names in the order of the copyright file; free-form files are searched for well-known words."""
+    if package in RUN_TIMES:
+        return RUN_TIMES[package]
     path = Path("/usr/share/doc") / package / "copyright"
     text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
     names = re.findall(r"^License:[ \t]*(\S[^\n]*)$", text, re.MULTILINE)

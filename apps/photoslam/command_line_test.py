@@ -162,6 +162,7 @@ class BadInputTest(CommandLineTest):
 
     def test_unparsable_list(self):
         sequence = self.copy_of_sequence()
+        (sequence / "associations.txt").unlink()
         (sequence / "rgb.txt").write_text("# images\n0.0 rgb/a.png\nnonsense\n", encoding="utf-8")
         result = photoslam("run", sequence, "--output", self.output)
         self.assert_fails(result, 1, "rgb.txt:3")
