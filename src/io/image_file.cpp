@@ -68,8 +68,10 @@ Status write_png(const std::filesystem::path& path, const ImageU16& image, int c
   return write_encoded(path, internal::encode_png(image, compression));
 }
 
+Result<std::string> encode_jpeg(const ImageU8& image, int quality) { return internal::encode_jpeg(image, quality); }
+
 Status write_jpeg(const std::filesystem::path& path, const ImageU8& image, int quality) {
-  return write_encoded(path, internal::encode_jpeg(image, quality));
+  return write_encoded(path, encode_jpeg(image, quality));
 }
 
 }  // namespace photoslam

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "base/result.h"
 #include "image/image.h"
@@ -20,7 +21,10 @@ Result<ImageU16> read_depth_png(const std::filesystem::path& path);
 Status write_png(const std::filesystem::path& path, const ImageU8& image, int compression = 3);
 Status write_png(const std::filesystem::path& path, const ImageU16& image, int compression = 3);
 
-/// Writes JPEG (1 or 3 channels) atomically.
+/// The content of a JPEG file (1 or 3 channels). Colour is kept at full resolution. `quality` 1…100.
+Result<std::string> encode_jpeg(const ImageU8& image, int quality = 92);
+
+/// Writes it atomically.
 Status write_jpeg(const std::filesystem::path& path, const ImageU8& image, int quality = 92);
 
 }  // namespace photoslam

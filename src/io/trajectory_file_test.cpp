@@ -56,7 +56,7 @@ TEST_F(TrajectoryFileTest, ReadsWhatItWrote) {
   for (int i = 0; i < 50; ++i) {
     const Vec3 omega(random.normal(), random.normal(), random.normal());
     const Vec3 position(random.normal(), random.normal(), random.normal());
-    trajectory.push_back({1305031102175304000 + i * 33333333, SE3(so3_exp(omega), position)});
+    trajectory.push_back({1305031102175304000 + i * int64_t{33333333}, SE3(so3_exp(omega), position)});
   }
   ASSERT_TRUE(write_tum_trajectory(folder / "t.tum", trajectory).ok());
   const Trajectory back = read_tum_trajectory(folder / "t.tum").value();
