@@ -21,10 +21,10 @@ using synthetic::Vertex;
 
 namespace {
 
-constexpr float kExposure = 0.62f;  // radiance of the image per radiance in the room
-constexpr int kSamples = 4;         // rays per pixel, on a rotated grid
-constexpr double kSampleX[kSamples] = {-0.125, 0.375, 0.125, -0.375};
-constexpr double kSampleY[kSamples] = {-0.375, -0.125, 0.375, 0.125};
+constexpr float kExposure = 1.3f;  // radiance of the image per radiance in the room
+constexpr int kSamples = 4;        // rays per pixel, on a rotated grid
+constexpr double kSampleX[kSamples] = {-0.2, 0.6, 0.2, -0.6};
+constexpr double kSampleY[kSamples] = {-0.6, -0.2, 0.6, 0.2};
 
 /// Origin and directions of a camera's rays; a ray's parameter is the depth (z coordinate) in the camera.
 struct Eye {
@@ -110,7 +110,7 @@ Color SyntheticRoom::State::shade(const RayTracer::Hits& hits, int ray, const Ve
 
   // One of the samples stands for half a pixel across, and for a quarter of the pixel's length on a slanted surface.
   const float across = hits.distance[k] / focal;
-  const float footprint = std::max(0.5f * across, std::min(0.25f * across / cosine, 2 * across));
+  const float footprint = std::max(0.8f * across, std::min(0.4f * across / cosine, 2 * across));
   const Vec2f place =
       patch.texture_origin + (patch.swap_uv ? Vec2f(uv.y(), uv.x()) : uv).cwiseProduct(patch.texture_size);
   const Color albedo = model.textures[static_cast<size_t>(material.texture)].sample(place.x(), place.y(),

@@ -11,10 +11,11 @@
 namespace photoslam {
 namespace {
 
-/// Display value in [0, 255] of a linear value: sRGB with a shoulder that keeps bright windows from clipping hard.
+/// Display value in [0, 255] of a linear value: sRGB, with more contrast as cameras have it, and a shoulder that keeps
+/// bright windows from clipping hard.
 float display_value(float linear) {
-  constexpr float kKnee = 0.6f;
-  const float x = std::max(linear, 0.0f);
+  constexpr float kKnee = 0.6f, kMiddle = 0.18f, kContrast = 1.15f;
+  const float x = kMiddle * std::pow(std::max(linear, 0.0f) / kMiddle, kContrast);
   const float compressed = x <= kKnee ? x : kKnee + (1 - kKnee) * (1 - std::exp(-(x - kKnee) / (1 - kKnee)));
   const float srgb = compressed <= 0.0031308f ? 12.92f * compressed : 1.055f * std::pow(compressed, 1 / 2.4f) - 0.055f;
   return 255 * srgb;

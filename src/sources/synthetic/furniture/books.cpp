@@ -107,9 +107,9 @@ void bookshelf(Workshop& w, const SE3& frame, double width, double height, int b
     fill_board(w, frame * place(kBoard, 0.01, z + kBoard), middle - kBoard, clear, kDepth - 0.02);
     fill_board(w, frame * place(middle + kBoard, 0.01, z + kBoard), width - middle - 2 * kBoard, clear, kDepth - 0.02);
   }
-  wicker_basket(w, frame * place(0.3, 0.16, height + 0.001), 0.14, 0.2);
-  potted_plant(w, frame * place(1.05, 0.16, height), 0.13, 0.3, 16);
-  book_pile(w, frame * place(0.66, 0.15, height, 10), 4);
+  wicker_basket(w, frame * place(0.2 * width, 0.16, height + 0.001), 0.14, 0.2);
+  potted_plant(w, frame * place(0.72 * width, 0.16, height), 0.13, 0.3, 16);
+  book_pile(w, frame * place(0.45 * width, 0.15, height, 10), 4);
 }
 
 }  // namespace photoslam::synthetic

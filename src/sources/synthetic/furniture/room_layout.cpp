@@ -34,9 +34,9 @@ void wall_things(Workshop& w, const Vec3& size) {
 
   // South: a gallery between the cupboard and the door.
   const auto south = [](double x, double z) { return place(x, 0.004, z, 180); };
-  framed_picture(w, south(3.2, 1.62), 0.62, 0.86, PictureKind::skyline, w.black);
-  framed_picture(w, south(2.47, 1.85), 0.5, 0.4, PictureKind::landscape, w.oak);
-  framed_picture(w, south(2.52, 1.36), 0.4, 0.5, PictureKind::botanical, w.walnut);
+  framed_picture(w, south(3.25, 1.72), 0.62, 0.8, PictureKind::skyline, w.black);
+  framed_picture(w, south(2.5, 1.98), 0.5, 0.4, PictureKind::landscape, w.oak);
+  framed_picture(w, south(2.52, 1.48), 0.4, 0.5, PictureKind::botanical, w.walnut);
 
   // East, beside the window.
   framed_picture(w, place(size.x() - 0.004, 0.42, 1.62, -90), 0.4, 0.54, PictureKind::abstract, w.oak);
@@ -94,7 +94,7 @@ void floor_lamp(Workshop& w, const SE3& frame) {
   mesh.lathe(frame, cone, Cover(shade, Cover::Fit::stretch, 0.03), 36);
   mesh.lathe(frame, inside, Cover(shade, Cover::Fit::stretch, 0.03), 36);
   const Vec3 glow = frame * Vec3(0, 0, 1.54);
-  w.lights.areas.push_back({.center = glow.cast<float>(), .radius = 0.24f, .radiance = Color(5.0f, 3.6f, 2.1f, 0)});
+  w.lights.areas.push_back({.center = glow.cast<float>(), .radius = 0.24f, .radiance = Color(1.7f, 1.25f, 0.75f, 0)});
 }
 
 RoomModel furnish_room(uint64_t seed, const Vec3& size, Executor& executor) {
@@ -112,7 +112,7 @@ RoomModel furnish_room(uint64_t seed, const Vec3& size, Executor& executor) {
 
   // West side.
   sofa(w, place(0.98, 0.75, 0, 90), 2.05);
-  floor_lamp(w, place(0.28, 3.3, 0));
+  floor_lamp(w, place(0.42, 3.28, 0));
   wicker_basket(w, place(0.62, 0.42, 0), 0.2, 0.32);
 
   // Middle.
@@ -123,7 +123,7 @@ RoomModel furnish_room(uint64_t seed, const Vec3& size, Executor& executor) {
   armchair(w, place(4.05, 0.75, 0, -130));
   tiled_stove(w, place(2.1, 0.53, 0, 180));
   cupboard(w, place(1.2, 0.47, 0, 180), 0.95);
-  wooden_chair(w, place(3.6, 0.62, 0, 200), seat);
+  bookshelf(w, place(3.32, 0.35, 0, 180), 1.05, 0.84, 3);
   wall_things(w, size);
 
   RoomModel model = std::move(w).finish(executor);

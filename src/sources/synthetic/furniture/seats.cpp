@@ -1,5 +1,7 @@
 // Copyright the photoslam authors.
 // SPDX-License-Identifier: Apache-2.0
+#include <span>
+
 #include "sources/synthetic/furniture/furniture.h"
 
 namespace photoslam::synthetic {
@@ -27,6 +29,35 @@ void throw_pillow(Workshop& w, const SE3& frame, double size, double lean_deg, i
   w.mesh().pillow(frame * leaning, Vec3(size, 0.19, size), Cover(cover, Cover::Fit::aligned, 0.02));
 }
 
+/// The point at the share t of a polyline's length.
+Vec2 along(std::span<const Vec2> path, double t) {
+  double length = 0;
+  for (size_t i = 1; i < path.size(); ++i) length += (path[i] - path[i - 1]).norm();
+  double rest = t * length;
+  for (size_t i = 1; i < path.size(); ++i) {
+    const double step = (path[i] - path[i - 1]).norm();
+    if (rest <= step) return path[i - 1] + rest / step * (path[i] - path[i - 1]);
+    rest -= step;
+  }
+  return path.back();
+}
+
+/// A knitted blanket that hangs over a sofa's back, down to the seat and over its edge.
+void blanket(Workshop& w, const SE3& frame, double sofa_depth, double seat) {
+  const int wool = w.material(0.7f, 1.7f, 450, knit(rgb(0xB0603C), w.seed()), {.gloss = 0.004f});
+  const Vec2 profile[] = {{sofa_depth + 0.015, 0.5},       {sofa_depth + 0.015, 0.84},
+                          {sofa_depth - 0.01, 0.865},      {sofa_depth - 0.42, 0.865},
+                          {sofa_depth - 0.455, 0.835},     {sofa_depth - 0.465, seat + 0.06},
+                          {sofa_depth - 0.5, seat + 0.04}, {0.03, seat + 0.035},
+                          {-0.02, seat + 0.015},           {-0.03, seat - 0.1}};
+  const auto surface = [&](double u, double v) -> Vec3 {
+    const double skew = 0.03 * std::sin(5 * v) + 0.05 * v, ripple = 0.006 * std::sin(19 * u + 7 * v);
+    const Vec2 yz = along(profile, v * (0.94 + 0.06 * u));
+    return {0.5 * u + skew, yz.x() + ripple, yz.y() + ripple};
+  };
+  w.mesh().patch(frame, 14, 60, surface, Cover(wool, Cover::Fit::aligned, 0.02));
+}
+
 }  // namespace
 
 void sofa(Workshop& w, const SE3& frame, double width) {
@@ -51,22 +82,7 @@ void sofa(Workshop& w, const SE3& frame, double width) {
   throw_pillow(w, frame * place(kArm + 0.2, 0.42, kSeat, 24), 0.44, -18, striped);
   throw_pillow(w, frame * place(kArm + 0.52, 0.4, kSeat, -6), 0.4, -22, dyed);
   throw_pillow(w, frame * place(width - kArm - 0.25, 0.42, kSeat, -20), 0.45, -18, flowered);
-  // A knitted blanket hangs over the back and down to the seat.
-  const int wool = w.material(0.7f, 1.4f, 450, knit(rgb(0xB0603C), w.seed()), {.gloss = 0.004f});
-  const double left = 0.5 * width - 0.02;
-  w.mesh().patch(
-      frame, 14, 24,
-      [&](double u, double v) -> Vec3 {
-        const double ripple = 0.008 * std::sin(19 * u + 3 * v);
-        const double x = left + 0.5 * u + 0.02 * std::sin(5 * v);
-        const double s = 1.25 * v;  // along the cloth, from behind the back over the top to the seat
-        if (s < 0.25) return {x, kDepth + 0.012 + ripple, 0.57 + s};
-        if (s < 0.5)
-          return {x, kDepth + 0.012 - 1.16 * (s - 0.25), 0.82 + 0.012 + 0.01 * std::sin(12.5 * (s - 0.25)) + ripple};
-        if (s < 0.9) return {x, kDepth - 0.29 - 0.14 - 0.03 * (s - 0.5) + ripple, 0.835 - 0.9 * (s - 0.5)};
-        return {x, kDepth - 0.443 - (s - 0.9), kSeat + 0.035 + ripple};
-      },
-      Cover(wool, Cover::Fit::aligned, 0.02));
+  blanket(w, frame * place(0.5 * width - 0.02, 0, 0), kDepth, kSeat);
 }
 
 void armchair(Workshop& w, const SE3& frame) {

@@ -68,7 +68,7 @@ void window(Workshop& w, const Vec3& size) {
                             .half_u = Vec3f(0, static_cast<float>(width / 2), 0),
                             .half_v = Vec3f(0, 0, static_cast<float>(height / 2)),
                             .normal = -Vec3f::UnitX(),
-                            .radiance = Color(5.4f, 6.0f, 6.8f, 0)});
+                            .radiance = Color(8.6f, 9.2f, 9.8f, 0)});
   w.lights.sun = {
       .towards = Vec3f(0.80f, -0.20f, 0.60f).normalized(), .radius = 0.02f, .irradiance = Color(9.0f, 7.6f, 5.6f, 0)};
 }
@@ -148,7 +148,7 @@ void pendant_lamp(Workshop& w, const Vec3& position, double ceiling) {
   w.mesh().tube(SE3(), wire, 0.004, Cover(w.black, Cover::Fit::random, 0.1), 6);
   w.lights.areas.push_back({.center = position.cast<float>(),
                             .radius = static_cast<float>(kRadius),
-                            .radiance = Color(8.5f, 7.0f, 5.0f, 0)});
+                            .radiance = Color(9.5f, 8.1f, 6.0f, 0)});
 }
 
 }  // namespace

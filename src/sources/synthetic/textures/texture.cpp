@@ -21,6 +21,12 @@ Color unpack(uint32_t texel) {
   return Eigen::Array<uint8_t, 4, 1>(std::bit_cast<std::array<uint8_t, 4>>(texel).data()).cast<float>();
 }
 
+/// The four bytes of a texel, each in 16 bits of its own.
+uint64_t spread(uint32_t texel) {
+  const uint64_t halves = (texel | static_cast<uint64_t>(texel) << 16) & 0x0000FFFF0000FFFFu;
+  return (halves | halves << 8) & 0x00FF00FF00FF00FFu;
+}
+
 /// Index into `size` texels continued by mirroring.
 int mirrored(int i, int size) {
   if (static_cast<unsigned>(i) < static_cast<unsigned>(size)) return i;
@@ -83,13 +89,18 @@ Texture::Level Texture::shrink(const Level& level) {
 Color Texture::bilinear(const Level& level, float x, float y) {
   const float tx = x * static_cast<float>(level.width) - 0.5f, ty = y * static_cast<float>(level.height) - 0.5f;
   const int ix = floor_int(tx), iy = floor_int(ty);
-  const float fx = tx - static_cast<float>(ix), fy = ty - static_cast<float>(iy);
   const int x0 = mirrored(ix, level.width), x1 = mirrored(ix + 1, level.width);
   const uint32_t* row0 = level.texels.data() + static_cast<ptrdiff_t>(mirrored(iy, level.height)) * level.width;
   const uint32_t* row1 = level.texels.data() + static_cast<ptrdiff_t>(mirrored(iy + 1, level.height)) * level.width;
-  const Color upper = unpack(row0[x0]) * (1 - fx) + unpack(row0[x1]) * fx;
-  const Color lower = unpack(row1[x0]) * (1 - fx) + unpack(row1[x1]) * fx;
-  return upper * (1 - fy) + lower * fy;
+  // Four 16-bit sums side by side in one integer; the weights add up to 256, so nothing overflows.
+  const uint32_t fx = static_cast<uint32_t>((tx - static_cast<float>(ix)) * 16 + 0.5f);
+  const uint32_t fy = static_cast<uint32_t>((ty - static_cast<float>(iy)) * 16 + 0.5f);
+  const uint64_t sums = (16 - fx) * (16 - fy) * spread(row0[x0]) + fx * (16 - fy) * spread(row0[x1]) +
+                        (16 - fx) * fy * spread(row1[x0]) + fx * fy * spread(row1[x1]);
+  const auto sum = [sums](int channel) {
+    return static_cast<float>(static_cast<int>(sums >> (16 * channel) & 0xFFFF)) * (1.0f / (256 * 255));
+  };
+  return {sum(0), sum(1), sum(2), sum(3)};
 }
 
 Color Texture::sample(float x, float y, float footprint) const {
@@ -104,7 +115,6 @@ Color Texture::sample(float x, float y, float footprint) const {
   if (level < last && blend > 0) {
     c = c * (1 - blend) + bilinear(levels_[static_cast<size_t>(level) + 1], u, v) * blend;
   }
-  c *= 1.0f / 255.0f;
   const float gloss = c[3];
   c = c.square();
   c[3] = gloss;

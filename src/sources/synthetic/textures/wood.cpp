@@ -8,8 +8,9 @@ namespace {
 
 /// Share of dark wood at a point: growth rings cut lengthwise, fibres and pores. Grain along x.
 float grain(float x, float y, uint32_t seed) {
-  const float warp = 0.035f * fractal(x * 0.9f, y * 4, 3, seed);
-  const float position = (y + warp) * 38 + 1.2f * noise(x * 0.6f, y * 2, seed + 1);
+  const float warp = 0.05f * fractal(x * 0.9f, y * 5, 3, seed);
+  // Rings lie close together where the tree grew slowly.
+  const float position = (y + warp) * 17 + 2.6f * fractal(x * 0.5f, y * 9, 3, seed + 1);
   const float ring = fraction(position);
   const float strength = 0.5f + 0.5f * hash01(floor_int(position), 3, seed);
   const float late_wood = smoothstep(0.15f, 0.8f, ring) * (1 - smoothstep(0.88f, 1.0f, ring)) * strength;
