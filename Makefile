@@ -10,6 +10,9 @@ SHELL := /bin/bash
 MAKEFLAGS += --no-print-directory
 JOBS ?= $(shell nproc)
 PREFIX ?= /usr/local
+# Lets the compiler cache serve every checkout on this machine.
+export CCACHE_BASEDIR := $(CURDIR)
+export CCACHE_NOHASHDIR := 1
 DEMO_FRAMES ?= 300
 
 photoslam := build/release/photoslam
