@@ -21,8 +21,34 @@ alignas(64) inline constexpr float kCellX[kCellPixels] = {0, 1, 2, 3, 0, 1, 2, 3
 alignas(64) inline constexpr float kCellY[kCellPixels] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
 inline constexpr size_t kVectorsPerCell = kCellPixels / kLanes;
 
-/// Entries to look ahead when prefetching: the records come from anywhere in L2 or L3.
-inline constexpr uint32_t kPrefetchAhead = 12;
+/// Entries blended between two looks at which cells are finished; their splats are copied to where they stay in L1.
+inline constexpr size_t kBatchSize = 64;
+
+/// A splat as a tile sees it.
+struct alignas(64) LocalSplat {
+  Splat splat;
+  float cell_u[kCellsPerRow];  ///< Position relative to the corners of the tile's cell columns …
+  float cell_v[kCellsPerRow];  ///< … and rows.
+};
+
+/// Copies entries [begin, begin + count) of a tile, and fetches the batch after them into the caches.
+HWY_INLINE void gather_batch(const Frame& frame, uint32_t begin, size_t count, uint32_t end, int x0, int y0,
+                             LocalSplat* batch) {
+  alignas(32) static constexpr float kCorner[kCellsPerRow] = {0, 4, 8, 12, 16, 20, 24, 28};
+  const hn::CappedTag<float, kCellsPerRow> d;
+  for (size_t i = 0; i < count; ++i) {
+    const uint32_t ahead = begin + static_cast<uint32_t>(i + kBatchSize);
+    if (ahead < end) __builtin_prefetch(&frame.splats[frame.entries[ahead].slot]);
+    LocalSplat& local = batch[i];
+    local.splat = frame.splats[frame.entries[begin + i].slot];
+    const auto u = hn::Set(d, local.splat.u - static_cast<float>(x0));
+    const auto v = hn::Set(d, local.splat.v - static_cast<float>(y0));
+    for (size_t k = 0; k < kCellsPerRow; k += hn::Lanes(d)) {
+      hn::Store(hn::Sub(u, hn::Load(d, kCorner + k)), d, local.cell_u + k);
+      hn::Store(hn::Sub(v, hn::Load(d, kCorner + k)), d, local.cell_v + k);
+    }
+  }
+}
 
 /// A splat's parameters in every lane.
 struct SplatLanes {
@@ -40,54 +66,73 @@ struct Coverage {
   Vec log2_alpha;
 };
 
-/// `x`, `y`: pixel coordinates of the lanes relative to the cell's corner; (u, v): the splat relative to the same.
-HWY_INLINE Coverage cover(const SplatLanes& s, Vec x, Vec y, float u, float v) {
+/// Part `part` of cell (column, row).
+HWY_INLINE Coverage cover(const LocalSplat& local, const SplatLanes& s, size_t column, size_t row, size_t part) {
   Coverage c;
-  const Vec dx = hn::Sub(x, hn::Set(kFloats, u));
-  c.dy = hn::Sub(y, hn::Set(kFloats, v));
+  const Vec dx = hn::Sub(hn::Load(kFloats, kCellX + part * kLanes), hn::Set(kFloats, local.cell_u[column]));
+  c.dy = hn::Sub(hn::Load(kFloats, kCellY + part * kLanes), hn::Set(kFloats, local.cell_v[row]));
   c.t = hn::NegMulAdd(s.slope, c.dy, dx);
   const Vec inner = hn::MulAdd(hn::Mul(c.dy, c.dy), s.kc, s.log2_opacity);
   c.log2_alpha = hn::MulAdd(hn::Mul(c.t, c.t), s.ka, inner);
   return c;
 }
 
-/// The cells of a tile that hold a pixel centre inside the splat's cut ellipse, as bits 8 row + column. Exact up to
-/// rounding, and never too small by more than that. (u, v): the splat relative to the tile's corner.
-HWY_INLINE uint64_t touched_cells(const Splat& s, float u, float v) {
-  const hn::CappedTag<float, 8> d;
-  const hn::RebindToSigned<decltype(d)> di;
-  using V = hn::Vec<decltype(d)>;
-  alignas(32) static constexpr float kRowTop[8] = {0, 4, 8, 12, 16, 20, 24, 28};
-  alignas(32) int32_t first[8], last[8];
-  const V extent_y = hn::Set(d, s.extent_y), minus_extent_y = hn::Set(d, -s.extent_y);
-  const V cut = hn::Set(d, s.cut), kc = hn::Set(d, s.kc), inv_ka = hn::Set(d, s.inv_ka);
-  const V slope = hn::Set(d, s.slope), peak = hn::Set(d, s.peak_dy), slack = hn::Set(d, 1e-3f);
-  for (size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    const V top = hn::Sub(hn::Load(d, kRowTop + i), hn::Set(d, v));
-    const V low = hn::Max(top, minus_extent_y);
-    const V high = hn::Min(hn::Add(top, hn::Set(d, 3.0f)), extent_y);
-    const V dy_right = hn::Min(hn::Max(peak, low), high);
-    const V dy_left = hn::Min(hn::Max(hn::Neg(peak), low), high);
-    const auto half_width = [&](V dy) {
-      const V square = hn::Mul(hn::MulAdd(hn::Mul(dy, dy), kc, cut), inv_ka);
-      return hn::Add(hn::Sqrt(hn::Max(square, hn::Zero(d))), slack);
-    };
-    const V right = hn::Add(hn::MulAdd(slope, dy_right, hn::Set(d, u)), half_width(dy_right));
-    const V left = hn::Sub(hn::MulAdd(slope, dy_left, hn::Set(d, u)), half_width(dy_left));
-    // Cell c spans the centres 4c … 4c+3. Clamped before conversion: splats may be far away.
-    const V quarter = hn::Set(d, 0.25f);
-    const V from = hn::Ceil(hn::Mul(hn::Sub(left, hn::Set(d, 3.0f)), quarter));
-    const V to = hn::Floor(hn::Mul(right, quarter));
-    const V to_or_none = hn::IfThenElse(hn::Le(low, high), to, hn::Set(d, -1.0f));
-    hn::Store(hn::ConvertTo(di, hn::Min(hn::Max(from, hn::Zero(d)), hn::Set(d, 8.0f))), di, first + i);
-    hn::Store(hn::ConvertTo(di, hn::Min(hn::Max(to_or_none, hn::Set(d, -1.0f)), hn::Set(d, 7.0f))), di, last + i);
+/// For each splat of a batch, the cells that hold a pixel centre inside its cut ellipse, as bits 8 row + column; up to
+/// a sliver more, never less. One splat per lane.
+HWY_INLINE void touched_cells(const LocalSplat* batch, size_t count, uint64_t* masks) {
+  using Bits = hn::RebindToUnsigned<Floats>;
+  constexpr Bits bits;
+  enum Field { kU, kV, kSlope, kKc, kCut, kInvKa, kPeak, kExtent, kFields };
+  alignas(64) float fields[kFields][kBatchSize];
+  for (size_t i = 0; i < count; ++i) {
+    const Splat& s = batch[i].splat;
+    const float values[kFields] = {batch[i].cell_u[0], batch[i].cell_v[0], s.slope,   s.kc, s.cut,
+                                   s.inv_ka,           s.peak_dy,          s.extent_y};
+    for (int k = 0; k < kFields; ++k) fields[k][i] = values[k];
   }
-  uint64_t mask = 0;
-  for (int row = 0; row < 8; ++row) {
-    const uint32_t bits = (0xFFu << first[row]) & (0xFFu >> (7 - last[row]));
-    mask |= static_cast<uint64_t>(bits & 0xFFu) << (8 * row);
+  // Adding this rounds to an integer and leaves it in the low mantissa bits.
+  const Vec magic = hn::Set(kFloats, 12582912.0f), zero = hn::Zero(kFloats), eight = hn::Set(kFloats, 8.0f);
+  const Vec quarter = hn::Set(kFloats, 0.25f), sliver = hn::Set(kFloats, 1.0f / 1024);
+  const auto all = hn::Set(bits, 0xFF), low_bits = hn::Set(bits, 15);
+  const auto round = [&](Vec x) HWY_ATTR {
+    return hn::And(hn::BitCast(bits, hn::Add(hn::Min(hn::Max(x, zero), eight), magic)), low_bits);
+  };
+  for (size_t i = 0; i < count; i += kLanes) {
+    const auto field = [&](Field f) HWY_ATTR { return hn::Load(kFloats, fields[f] + i); };
+    const Vec u = field(kU), v = field(kV), slope = field(kSlope), kc = field(kKc), cut = field(kCut);
+    const Vec inv_ka = field(kInvKa), peak = field(kPeak), extent = field(kExtent);
+    const Vec minus_peak = hn::Neg(peak), minus_extent = hn::Neg(extent);
+    auto low_mask = hn::Zero(bits), high_mask = hn::Zero(bits);
+    for (int row = 7; row >= 0; --row) {
+      // The ellipse between the row's first and last line of pixel centres: its widest points are at ±peak, or at the
+      // nearer line.
+      const Vec top = hn::Sub(hn::Set(kFloats, static_cast<float>(row * kCellSize)), v);
+      const Vec low = hn::Max(top, minus_extent);
+      const Vec high = hn::Min(hn::Add(top, hn::Set(kFloats, kCellSize - 1.0f)), extent);
+      const Vec dy_right = hn::Min(hn::Max(peak, low), high), dy_left = hn::Min(hn::Max(minus_peak, low), high);
+      const Vec square_right = hn::Mul(hn::MulAdd(hn::Mul(dy_right, dy_right), kc, cut), inv_ka);
+      const Vec square_left = hn::Mul(hn::MulAdd(hn::Mul(dy_left, dy_left), kc, cut), inv_ka);
+      const Vec right = hn::Add(hn::MulAdd(slope, dy_right, u), hn::Sqrt(hn::Max(square_right, zero)));
+      const Vec left = hn::Sub(hn::MulAdd(slope, dy_left, u), hn::Sqrt(hn::Max(square_left, zero)));
+      // Columns from ceil((left − 3) / 4) up to floor(right / 4); `past` is one more.
+      const auto first = round(hn::MulAdd(left, quarter, hn::Sub(hn::Set(kFloats, -0.25f), sliver)));
+      const auto past = round(hn::MulAdd(right, quarter, hn::Add(hn::Set(kFloats, 0.5f), sliver)));
+      auto mask = hn::And(hn::Shl(all, first), hn::Shr(all, hn::Sub(hn::Set(bits, 8), past)));
+      mask = hn::IfThenElseZero(hn::RebindMask(bits, hn::Le(low, high)), mask);
+      auto& half = row >= 4 ? high_mask : low_mask;
+      half = hn::Or(hn::ShiftLeft<8>(half), mask);
+    }
+    alignas(64) uint32_t lows[16], highs[16];
+    hn::Store(low_mask, bits, lows);
+    hn::Store(high_mask, bits, highs);
+    for (size_t k = 0; k < kLanes; ++k) masks[i + k] = lows[k] | (static_cast<uint64_t>(highs[k]) << 32);
   }
-  return mask;
+}
+
+/// Calls f(cell) for every set bit, lowest first.
+template <class F>
+HWY_INLINE void for_each_cell(uint64_t mask, F&& f) {
+  for (; mask != 0; mask &= mask - 1) f(hwy::Num0BitsBelowLS1Bit_Nonzero64(mask));
 }
 
 }  // namespace photoslam::splatting::HWY_NAMESPACE

@@ -16,6 +16,9 @@
 HWY_BEFORE_NAMESPACE();
 namespace photoslam::splatting::HWY_NAMESPACE {
 
+/// Gradient records to fetch ahead of writing them.
+inline constexpr uint32_t kRecordsAhead = 12;
+
 /// What a tile's pixels carry along, cell after cell. `behind` is Σ over the splats still to come of weight times
 /// (gradient · value), the background included: with it one number per pixel replaces the colours behind.
 struct TileGradientState {
@@ -27,26 +30,57 @@ struct TileGradientState {
 
 void begin_gradient_tile(const Frame& frame, int x0, int y0, const RenderResult& image, const ImageGradient& gradient,
                          TileGradientState& state) {
+  const int columns = std::min(kTileSize, frame.width - x0), rows = std::min(kTileSize, frame.height - y0);
   const size_t plane = static_cast<size_t>(frame.width) * static_cast<size_t>(frame.height);
-  for (int at = 0; at < kTilePixels; ++at) {
-    const int cell = at / kCellPixels, i = at % kCellPixels;
-    const int x = x0 + (cell % kCellsPerRow) * kCellSize + i % kCellSize;
-    const int y = y0 + (cell / kCellsPerRow) * kCellSize + i / kCellSize;
-    const bool inside = x < frame.width && y < frame.height;
-    state.transmittance[at] = inside ? 1.0f : -1.0f;
-    const size_t pixel = static_cast<size_t>(y) * static_cast<size_t>(frame.width) + static_cast<size_t>(x);
-    float behind = 0;
-    for (size_t k = 0; k < 3; ++k) {
-      const float g = inside ? gradient.rgb[k * plane + pixel] : 0.0f;
-      state.rgb[k][at] = g;
-      if (inside) behind += g * image.rgb[k * plane + pixel];
-    }
-    const float depth = inside && !gradient.depth.empty() ? gradient.depth[pixel] : 0.0f;
-    state.depth[at] = depth;
-    if (inside) behind += depth * image.depth[pixel];
-    if (inside && !gradient.alpha.empty()) behind -= gradient.alpha[pixel] * (1.0f - image.alpha[pixel]);
-    state.behind[at] = behind;
+  if (columns < kTileSize || rows < kTileSize) {
+    std::fill_n(state.transmittance, kTilePixels, -1.0f);
+    std::fill_n(state.behind, kTilePixels, 0.0f);
+    std::fill_n(state.rgb[0], 3 * kTilePixels, 0.0f);
+    std::fill_n(state.depth, kTilePixels, 0.0f);
   }
+  for (int y = 0; y < rows; ++y) {
+    const size_t in = static_cast<size_t>(y0 + y) * static_cast<size_t>(frame.width) + static_cast<size_t>(x0);
+    for (int x = 0; x < columns; x += kCellSize) {
+      const int cell = (y / kCellSize) * kCellsPerRow + x / kCellSize;
+      const int first = cell * kCellPixels + (y % kCellSize) * kCellSize;
+      const int count = std::min(kCellSize, columns - x);
+      for (int i = 0; i < count; ++i) {
+        const int at = first + i;
+        const size_t pixel = in + static_cast<size_t>(x + i);
+        float behind = 0;
+        for (size_t k = 0; k < 3; ++k) {
+          const float g = gradient.rgb[k * plane + pixel];
+          state.rgb[k][at] = g;
+          behind += g * image.rgb[k * plane + pixel];
+        }
+        const float depth = gradient.depth.empty() ? 0.0f : gradient.depth[pixel];
+        behind += depth * image.depth[pixel];
+        if (!gradient.alpha.empty()) behind -= gradient.alpha[pixel] * (1.0f - image.alpha[pixel]);
+        state.depth[at] = depth;
+        state.behind[at] = behind;
+        state.transmittance[at] = 1.0f;
+      }
+    }
+  }
+}
+
+/// Sums of each of four vectors, side by side: transposes within 128-bit blocks, then adds up the blocks.
+HWY_INLINE void store_sums(Vec a, Vec b, Vec c, Vec d, float* out) {
+  const hn::Repartition<double, Floats> doubles;
+  const Vec ab = hn::Add(hn::InterleaveLower(kFloats, a, b), hn::InterleaveUpper(kFloats, a, b));
+  const Vec cd = hn::Add(hn::InterleaveLower(kFloats, c, d), hn::InterleaveUpper(kFloats, c, d));
+  const auto ab2 = hn::BitCast(doubles, ab), cd2 = hn::BitCast(doubles, cd);
+  const Vec sums = hn::Add(hn::BitCast(kFloats, hn::InterleaveLower(doubles, ab2, cd2)),
+                           hn::BitCast(kFloats, hn::InterleaveUpper(doubles, ab2, cd2)));
+  const auto add_blocks = [](auto tag, auto v, auto& self) HWY_ATTR {
+    if constexpr (hn::MaxLanes(tag) == 4) {
+      return v;
+    } else {
+      const hn::Half<decltype(tag)> half;
+      return self(half, hn::Add(hn::LowerHalf(half, v), hn::UpperHalf(half, v)), self);
+    }
+  };
+  hn::Store(add_blocks(kFloats, sums, add_blocks), hn::FixedTag<float, 4>(), out);
 }
 
 /// Lane-wise sums of one gradient record.
@@ -66,37 +100,28 @@ struct RecordLanes {
         weight(t),
         max_weight(t) {}
 
-  HWY_INLINE static float sum(Vec v) { return hn::GetLane(hn::SumOfLanes(kFloats, v)); }
   HWY_INLINE void reduce(SplatGradient& out) const {
-    out.t = sum(t);
-    out.dy = sum(dy);
-    out.tt = sum(tt);
-    out.t_dy = sum(t_dy);
-    out.dy_dy = sum(dy_dy);
-    out.one = sum(one);
-    out.rgb[0] = sum(r);
-    out.rgb[1] = sum(g);
-    out.rgb[2] = sum(b);
-    out.z = sum(z);
-    out.weight = sum(weight);
+    store_sums(t, dy, tt, t_dy, &out.t);
+    store_sums(dy_dy, one, r, g, &out.dy_dy);
+    store_sums(b, z, weight, weight, &out.rgb[2]);
     out.max_weight = hn::GetLane(hn::MaxOfLanes(kFloats, max_weight));
   }
 };
 
 template <bool kDepth>
-HWY_INLINE void unblend_cell(const Splat& splat, const SplatLanes& lanes, float u, float v, int cell,
-                             TileGradientState& state, RecordLanes& sums) {
-  const Vec zero = hn::Zero(kFloats), one = hn::Set(kFloats, 1.0f), max_alpha = hn::Set(kFloats, kMaxAlpha);
+HWY_INLINE void unblend_cell(const LocalSplat& local, const SplatLanes& lanes, size_t cell, TileGradientState& state,
+                             RecordLanes& sums) {
+  const Splat& splat = local.splat;
+  const Vec one = hn::Set(kFloats, 1.0f), max_alpha = hn::Set(kFloats, kMaxAlpha);
   for (size_t part = 0; part < kVectorsPerCell; ++part) {
-    const size_t at = static_cast<size_t>(cell) * kCellPixels + part * kLanes;
-    const Coverage c =
-        cover(lanes, hn::Load(kFloats, kCellX + part * kLanes), hn::Load(kFloats, kCellY + part * kLanes), u, v);
-    const Vec raw = exp2_fast(c.log2_alpha);
+    const size_t at = cell * kCellPixels + part * kLanes;
+    const Coverage c = cover(local, lanes, cell % kCellsPerRow, cell / kCellsPerRow, part);
+    const Mask hit = hn::Ge(c.log2_alpha, hn::Set(kFloats, -kLog2Cut));
+    const Vec raw = hn::IfThenElseZero(hit, exp2_fast(c.log2_alpha));
     const Vec alpha = hn::Min(raw, max_alpha);
     const Vec before = hn::Load(kFloats, state.transmittance + at);
     const Vec after = hn::NegMulAdd(alpha, before, before);
-    const Mask hit = hn::And(hn::Ge(c.log2_alpha, hn::Set(kFloats, -kLog2Cut)), hn::Gt(after, zero));
-    const Mask blend = hn::And(hit, hn::Gt(after, hn::Set(kFloats, kMinTransmittance)));
+    const Mask blend = hn::Gt(after, hn::Set(kFloats, kMinTransmittance));
     const Vec weight = hn::IfThenElseZero(blend, hn::Mul(alpha, before));
     const Vec gr = hn::Load(kFloats, state.rgb[0] + at), gg = hn::Load(kFloats, state.rgb[1] + at);
     const Vec gb = hn::Load(kFloats, state.rgb[2] + at);
@@ -110,9 +135,10 @@ HWY_INLINE void unblend_cell(const Splat& splat, const SplatLanes& lanes, float 
     }
     const Vec behind = hn::NegMulAdd(weight, value, hn::Load(kFloats, state.behind + at));
     hn::Store(behind, kFloats, state.behind + at);
-    // dL/d(alpha) = T value − behind / (1 − alpha); a clamped alpha does not follow its exponent.
-    const Vec d_alpha = hn::NegMulAdd(behind, reciprocal(hn::Sub(one, alpha)), hn::Mul(before, value));
-    const Vec h = hn::IfThenElseZero(hn::And(blend, hn::Le(raw, max_alpha)), hn::Mul(alpha, d_alpha));
+    // dL/d(ln alpha) = weight value − behind alpha / (1 − alpha), with alpha > 0 and unclamped only.
+    const Vec odds = hn::Mul(alpha, reciprocal(hn::Sub(one, alpha)));
+    const Mask moves = hn::And(blend, hn::Le(raw, max_alpha));
+    const Vec h = hn::IfThenElseZero(moves, hn::NegMulAdd(behind, odds, hn::Mul(weight, value)));
     const Vec h_t = hn::Mul(h, c.t), h_dy = hn::Mul(h, c.dy);
     sums.t = hn::Add(sums.t, h_t);
     sums.dy = hn::Add(sums.dy, h_dy);
@@ -125,32 +151,28 @@ HWY_INLINE void unblend_cell(const Splat& splat, const SplatLanes& lanes, float 
     sums.b = hn::MulAdd(weight, gb, sums.b);
     sums.weight = hn::Add(sums.weight, weight);
     sums.max_weight = hn::Max(sums.max_weight, weight);
-    Vec transmittance = hn::IfThenElse(blend, after, before);
-    transmittance = hn::IfThenElse(hn::AndNot(blend, hit), hn::Neg(transmittance), transmittance);
-    hn::Store(transmittance, kFloats, state.transmittance + at);
+    const Vec finished = hn::Or(before, hn::Set(kFloats, -0.0f));
+    hn::Store(hn::IfThenElse(blend, after, finished), kFloats, state.transmittance + at);
   }
 }
 
 template <bool kDepth>
 HWY_INLINE void unblend_entries(Frame& frame, uint32_t begin, uint32_t end, int x0, int y0, TileGradientState& state) {
-  for (uint32_t i = begin; i < end; ++i) {
-    if (i + kPrefetchAhead < end) {
-      const TileEntry next = frame.entries[i + kPrefetchAhead];
-      __builtin_prefetch(&frame.splats[next.slot]);
-      __builtin_prefetch(&frame.gradients[next.instance], 1);
+  alignas(64) LocalSplat batch[kBatchSize];
+  while (begin < end) {
+    const size_t count = std::min<size_t>(kBatchSize, end - begin);
+    gather_batch(frame, begin, count, end, x0, y0, batch);
+    for (size_t i = 0; i < count; ++i) {
+      const uint32_t instance = frame.entries[begin + i].instance;
+      if (begin + i + kRecordsAhead < end)
+        __builtin_prefetch(&frame.gradients[frame.entries[begin + i + kRecordsAhead].instance], 1);
+      const SplatLanes lanes(batch[i].splat);
+      RecordLanes sums;
+      for_each_cell(frame.cell_masks[begin + i],
+                    [&](size_t cell) HWY_ATTR { unblend_cell<kDepth>(batch[i], lanes, cell, state, sums); });
+      sums.reduce(frame.gradients[instance]);
     }
-    const TileEntry entry = frame.entries[i];
-    const Splat& splat = frame.splats[entry.slot];
-    const float u = splat.u - static_cast<float>(x0), v = splat.v - static_cast<float>(y0);
-    const SplatLanes lanes(splat);
-    RecordLanes sums;
-    for (uint64_t cells = frame.cell_masks[i]; cells != 0; cells &= cells - 1) {
-      const int cell = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero64(cells));
-      const float cell_u = u - static_cast<float>((cell % kCellsPerRow) * kCellSize);
-      const float cell_v = v - static_cast<float>((cell / kCellsPerRow) * kCellSize);
-      unblend_cell<kDepth>(splat, lanes, cell_u, cell_v, cell, state, sums);
-    }
-    sums.reduce(frame.gradients[entry.instance]);
+    begin += static_cast<uint32_t>(count);
   }
 }
 
