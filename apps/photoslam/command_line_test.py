@@ -124,6 +124,10 @@ class ConfigTest(CommandLineTest):
             self.assert_fails(result, 1, f"{file}:2:1: ", "did you mean 'pipeline.input_queue'?")
         self.assert_nothing_written()
 
+    def test_a_setting_takes_one_word(self):
+        result = photoslam("run", "--set", "pipeline.input_queue=7", self.folder / "nowhere", "--output", self.output)
+        self.assert_fails(result, 1, self.folder / "nowhere")
+
     def test_unknown_key_in_a_setting(self):
         result = photoslam("run", SEQUENCE, "--output", self.output, "--set", "pipeline.input_queu=7")
         self.assert_fails(result, 1, "did you mean 'pipeline.input_queue'?")

@@ -8,10 +8,10 @@
 #include "base/file.h"
 #include "base/version.h"
 #include "commands.h"
+#include "config_arguments.h"
 #include "evaluation/report_html.h"
 #include "evaluation/run_evaluation.h"
 #include "interrupt.h"
-#include "pipeline/config.h"
 #include "pipeline/system.h"
 #include "progress_line.h"
 #include "result_table.h"
@@ -33,18 +33,14 @@ struct RunArguments {
   int iterations_per_frame = -1;
   double map_until_s = -1;
   RunSettings settings;
-  fs::path config;
-  std::vector<std::string> assignments;
+  ConfigArguments config;
   bool json = false;
 };
 
 Status configure(const RunArguments& arguments, SystemOptions& options, RunSettings& settings) {
-  if (!arguments.config.empty()) {
-    if (Status status = load_config(arguments.config, options); !status) return status;
-  }
-  for (const std::string& assignment : arguments.assignments) {
-    if (Status status = apply_setting(assignment, options); !status) return status;
-  }
+  Result<SystemOptions> loaded = arguments.config.load();
+  if (!loaded) return loaded.error();
+  options = std::move(*loaded);
   settings = arguments.settings;
   if (arguments.iterations_per_frame >= 0) {
     options.pipeline.iterations_per_frame = arguments.iterations_per_frame;
@@ -156,8 +152,7 @@ void add_run(CommandLine& line) {
       ->check(CLI::Range(0, 1000));
   command.add_option("--threads", a.settings.threads, "Threads for mapping; 0: one per core")
       ->check(CLI::Range(0, 1024));
-  command.add_option("--config", a.config, "Configuration file (TOML); see photoslam config");
-  command.add_option("--set", a.assignments, "Change one configuration value: key=value");
+  a.config.bind(command);
   command.add_flag("--json", a.json, "Print the report as JSON instead of the table");
   line.on_run(command, [arguments] { return run(*arguments); });
 }
