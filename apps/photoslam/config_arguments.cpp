@@ -11,8 +11,7 @@ void ConfigArguments::bind(CLI::App& command) {
       ->type_name("FILE.toml");
   command.add_option("--set", settings, "Set one configuration value; may be given several times")
       ->type_name("KEY=VALUE")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+      ->allow_extra_args(false);  // the next word may be the dataset
 }
 
 Result<SystemOptions> ConfigArguments::load() const {
