@@ -51,9 +51,10 @@ test: ## Install what is missing, build everything and run all tests
 	$(call say,Running the tests)
 	@ctest --test-dir build/release --output-on-failure --progress -j $(JOBS)
 
-install: build ## Install into PREFIX (default /usr/local)
+install: build ## Install the program and the library into PREFIX (default /usr/local)
 	$(call say,Installing into $(PREFIX))
-	@cmake --install build/release --prefix $(PREFIX)
+	@ninja -C build/release -j $(JOBS) photoslam_shared
+	cmake --install build/release --prefix $(PREFIX)
 
 lint: ## Check layers, sizes, formatting, and run clang-tidy on everything
 	@scripts/install_dependencies.sh build test lint
