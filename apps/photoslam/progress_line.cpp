@@ -11,7 +11,8 @@
 namespace photoslam {
 namespace {
 
-constexpr double kLineInterval_s = 2.0;  // without a terminal
+constexpr double kRewriteInterval_s = 0.1;  // on a terminal
+constexpr double kLineInterval_s = 2.0;     // elsewhere
 
 std::string describe(const Progress& p) {
   const std::string map = fmt::format("{} keyframes, {} gaussians, {} iterations, PSNR {:.1f} dB", p.keyframes,
@@ -39,14 +40,15 @@ ProgressLine::~ProgressLine() {
 }
 
 void ProgressLine::show(const Progress& progress) {
+  if (!first_ && since_last_.seconds() < (terminal_ ? kRewriteInterval_s : kLineInterval_s)) return;
+  since_last_.restart();
+  first_ = false;
   if (terminal_) {
     fmt::print(stderr, "\r\033[K{}", describe(progress));
     std::fflush(stderr);
     open_ = true;
-  } else if (first_ || since_last_.seconds() >= kLineInterval_s) {
+  } else {
     fmt::print(stderr, "{}\n", describe(progress));
-    since_last_.restart();
-    first_ = false;
   }
 }
 

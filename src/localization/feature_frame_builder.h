@@ -12,7 +12,7 @@
 namespace photoslam {
 
 struct DepthOptions {
-  double virtual_baseline_m = 0.08;  ///< Turns depth into a disparity, whose error does not grow with depth.
+  double virtual_baseline_m = 0.2;  ///< Turns depth into a disparity, whose error does not grow with depth.
   double min_m = 0.1;
   double max_m = 8.0;
   double max_edge_ratio = 0.04;  ///< Depth step in a 3x3 patch, relative to the depth, that marks an edge.

@@ -33,6 +33,11 @@ std::optional<FedFrame> FrameFeed::next() {
   return FedFrame{std::move(*frame), now, now};
 }
 
+int64_t FrameFeed::timestamp_ns(FrameId frame) const {
+  std::lock_guard lock(mutex_);
+  return timestamps_.at(frame);
+}
+
 void FrameFeed::wait_until(SteadyTime due) {
   constexpr auto kStopCheck = std::chrono::milliseconds(50);  // a stop is noticed at least this often
   while (!stop_.stop_requested()) {
@@ -57,6 +62,10 @@ void FrameFeed::read_all() {
         }
         due = start + std::chrono::nanoseconds(frame->timestamp_ns - *first_ns);
         wait_until(due);
+      }
+      {
+        std::lock_guard lock(mutex_);
+        timestamps_[frame->id] = frame->timestamp_ns;
       }
       if (!queue_.push({std::move(*frame), due, steady_clock::now()})) break;
     }

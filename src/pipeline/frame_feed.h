@@ -3,6 +3,8 @@
 #pragma once
 
 #include <chrono>
+#include <map>
+#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <thread>
@@ -35,6 +37,9 @@ class FrameFeed {
   /// The next frame; nothing at the end of the input or after a stop.
   std::optional<FedFrame> next();
 
+  /// Of a frame that was read, also if it was dropped.
+  int64_t timestamp_ns(FrameId frame) const;
+
  private:
   void read_all();
   void wait_until(SteadyTime due);
@@ -45,6 +50,8 @@ class FrameFeed {
   FailureReport& failures_;
   BoundedQueue<FedFrame> queue_;
   bool threaded_;
+  mutable std::mutex mutex_;
+  std::map<FrameId, int64_t> timestamps_;
   std::thread thread_;
 };
 

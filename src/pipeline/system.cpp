@@ -55,7 +55,7 @@ class Session {
  private:
   Stage<NewKeyframe>::Work geometry_work();
   Stage<MappingMessage>::Work mapping_work();
-  void localize_all();
+  void localize_all(const std::function<void()>& after_each_frame);
   void localize(FedFrame fed);
   void record(FrameOutcome outcome);
   void deliver(MapUpdate update);
@@ -157,6 +157,7 @@ void Session::localize(FedFrame fed) {
   for (; next_frame_id_ < fed.frame.id.value; ++next_frame_id_) {
     FrameOutcome dropped;
     dropped.frame = FrameId(next_frame_id_);
+    dropped.timestamp_ns = feed_.timestamp_ns(dropped.frame);
     dropped.dropped = true;
     dropped.reason = "came too fast";
     record(std::move(dropped));
@@ -175,9 +176,12 @@ void Session::localize(FedFrame fed) {
   ++frame_number_;
 }
 
-void Session::localize_all() {
+void Session::localize_all(const std::function<void()>& after_each_frame) {
   try {
-    while (auto fed = feed_.next()) localize(std::move(*fed));
+    while (auto fed = feed_.next()) {
+      localize(std::move(*fed));
+      after_each_frame();
+    }
   } catch (const std::exception& e) {
     failures_.report("localization", e.what());
   }
@@ -233,10 +237,12 @@ void Session::refine(const std::function<void(const Progress&)>& on_progress) {
 
 RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress) {
   if (!threaded_) {
-    localize_all();
+    localize_all([&] {
+      if (on_progress) on_progress(progress(Progress::Phase::online));
+    });
   } else {
     std::thread localization([this] {
-      localize_all();
+      localize_all([] {});
       std::lock_guard lock(mutex_);
       localization_done_ = true;
       localization_ended_.notify_all();

@@ -1,0 +1,136 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "pipeline/system.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "pipeline/testing/corner_source.h"
+
+namespace photoslam {
+namespace {
+
+using testing::CornerSource;
+
+RunSettings deterministic(int threads) {
+  RunSettings settings;
+  settings.deterministic = true;
+  settings.threads = threads;
+  return settings;
+}
+
+RunOutcome run(CornerSource source, const RunSettings& settings) {
+  SystemOptions options;
+  options.pipeline.iterations_per_frame = 2;
+  return run_slam(options, settings, source);
+}
+
+void expect_same_bytes(const RunOutcome& a, const RunOutcome& b) {
+  const Trajectory ta = final_trajectory(a), tb = final_trajectory(b);
+  ASSERT_EQ(ta.size(), tb.size());
+  for (size_t i = 0; i < ta.size(); ++i) {
+    EXPECT_EQ(ta[i].world_from_camera.translation, tb[i].world_from_camera.translation) << i;
+    EXPECT_EQ(ta[i].world_from_camera.rotation.coeffs(), tb[i].world_from_camera.rotation.coeffs()) << i;
+  }
+  ASSERT_EQ(a.final.gaussians.size(), b.final.gaussians.size());
+  a.final.gaussians.for_each([&](size_t i) {
+    const splatting::Gaussian ga = a.final.gaussians.get(i), gb = b.final.gaussians.get(i);
+    EXPECT_EQ(std::memcmp(&ga, &gb, sizeof ga), 0) << i;
+  });
+}
+
+TEST(RunSlam, DeterministicRunsGiveTheSameBytesAtAnyNumberOfThreads) {
+  const RunOutcome one = run(CornerSource(40), deterministic(1));
+  EXPECT_GT(one.final.gaussians.size(), 200u);
+  EXPECT_GE(one.final.keyframes_from_world.size(), 2u);
+  expect_same_bytes(one, run(CornerSource(40), deterministic(2)));
+  expect_same_bytes(one, run(CornerSource(40), deterministic(3)));
+}
+
+TEST(RunSlam, TracksAnExactSequenceClosely) {
+  const RunOutcome outcome = run(CornerSource(40), deterministic(2));
+  ASSERT_EQ(outcome.frames.size(), 40u);
+  for (const FrameOutcome& frame : outcome.frames) {
+    ASSERT_TRUE(frame.has_pose) << frame.frame.value << ": " << frame.reason;
+    const SE3 truth = CornerSource::camera_from_world(frame.frame.value);  // the first pose is the identity in both
+    const SE3 error = camera_from_world(frame, outcome.final).value() * truth.inverse();
+    // The camera has 240x180 pixels: at 3 m one of them is 15 mm wide.
+    EXPECT_LT(error.translation.norm(), 0.03) << "frame " << frame.frame.value;
+  }
+}
+
+TEST(RunSlam, RealTimePaceAccountsForEveryFrame) {
+  RunSettings settings;
+  CornerSource source(20);
+  const RunOutcome outcome = run_slam({}, settings, source);
+  ASSERT_EQ(outcome.frames.size(), 20u);
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(outcome.frames[static_cast<size_t>(i)].frame, FrameId(i));
+  EXPECT_GE(outcome.seconds_online, 19 / 30.0);
+  EXPECT_TRUE(outcome.failure.empty()) << outcome.failure;
+}
+
+TEST(RunSlam, HeldOutFramesAreTrackedButNeverMapped) {
+  RunSettings settings = deterministic(2);
+  settings.hold_out = 4;
+  const RunOutcome outcome = run(CornerSource(30), settings);
+  int held_out = 0;
+  for (const FrameOutcome& frame : outcome.frames) {
+    EXPECT_EQ(frame.held_out, frame.frame.value % 4 == 3);
+    if (!frame.held_out) continue;
+    ++held_out;
+    EXPECT_TRUE(frame.has_pose);
+    EXPECT_FALSE(frame.keyframe.valid());
+  }
+  EXPECT_EQ(held_out, 7);
+}
+
+TEST(RunSlam, AnUnreadableFrameIsCountedAndSkipped) {
+  CornerSource source(15);
+  source.defect_at = 6;
+  const RunOutcome outcome = run(std::move(source), deterministic(2));
+  ASSERT_EQ(outcome.frames.size(), 15u);
+  EXPECT_FALSE(outcome.frames[6].has_pose);
+  EXPECT_EQ(outcome.frames[6].reason, "unreadable");
+  EXPECT_TRUE(outcome.frames[7].has_pose) << outcome.frames[7].reason;
+}
+
+TEST(RunSlam, AFailingSourceEndsTheRunWithEverythingMadeSoFar) {
+  for (int threads : {1, 2}) {
+    CornerSource source(30);
+    source.throw_at = 12;
+    const RunOutcome outcome = run(std::move(source), deterministic(threads));
+    EXPECT_NE(outcome.failure.find("the cable was pulled"), std::string::npos) << outcome.failure;
+    EXPECT_EQ(outcome.frames.size(), 12u);
+    EXPECT_GT(outcome.final.gaussians.size(), 0u);
+  }
+}
+
+TEST(RunSlam, AStopFromOutsideKeepsWhatWasMade) {
+  CornerSource source(100000);
+  std::stop_source stop;
+  const RunOutcome outcome = run_slam({}, {}, source, stop.get_token(), [&](const Progress& progress) {
+    if (progress.frames >= 5) stop.request_stop();
+  });
+  EXPECT_TRUE(outcome.interrupted);
+  EXPECT_TRUE(outcome.failure.empty()) << outcome.failure;
+  EXPECT_LT(outcome.frames.size(), 2000u);
+  EXPECT_GT(outcome.final.gaussians.size(), 0u);
+}
+
+TEST(RunSlam, RefinementRunsTheIterationsAskedFor) {
+  RunSettings settings = deterministic(2);
+  settings.refine_iterations = 25;
+  const RunOutcome outcome = run(CornerSource(12), settings);
+  EXPECT_EQ(outcome.iterations, 12 * 2 - 2 * 3 + 25) << "no iterations before the first keyframe has arrived";
+}
+
+TEST(RunSlam, AnEmptySourceGivesAnEmptyMap) {
+  const RunOutcome outcome = run(CornerSource(0), deterministic(1));
+  EXPECT_TRUE(outcome.frames.empty());
+  EXPECT_TRUE(outcome.final.gaussians.empty());
+  EXPECT_TRUE(outcome.failure.empty());
+}
+
+}  // namespace
+}  // namespace photoslam
