@@ -31,12 +31,13 @@ class Page {
     add("<style>{}</style></head>\n<body><main>\n<p class=\"brand\">photoslam</p>\n<h1>{}</h1>\n", html::kStyle,
         html::escape(content_.title));
     page_ += html::lead(content_.report);
+    for (const std::string& note : content_.notes) add("<p class=\"note\">Note: {}</p>\n", html::escape(note));
     page_ += html::tiles(content_.report);
     add_trajectories();
     if (const Status status = add_pairs(); !status) return status.error();
     add_curves();
     add("<h2>Figures</h2>\n<p class=\"note\">– means not measured.</p>\n");
-    page_ += html::tables(content_.report);
+    page_ += html::tables(content_.report, content_.frames);
     page_ += html::configuration(content_.report);
     add("<footer>photoslam {} · {}</footer>\n</main></body></html>\n", html::escape(content_.report.version),
         html::escape(content_.report.machine));

@@ -21,7 +21,8 @@ struct ImagePair {
 
 /// What report.html shows; parts that are empty are left out.
 struct HtmlReport {
-  std::string title;  ///< For example the name of the dataset.
+  std::string title;               ///< For example the name of the dataset.
+  std::vector<std::string> notes;  ///< What the user should know about the input.
   Report report;
   Trajectory estimate;  ///< In the world of the truth, when there is one.
   Trajectory truth;

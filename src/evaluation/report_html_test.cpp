@@ -18,6 +18,7 @@ using testing::Not;
 HtmlReport small_run() {
   HtmlReport content;
   content.title = "a <room>";
+  content.notes = {"the depth scale is a guess"};
   for (int i = 0; i < 100; ++i) {
     const int64_t time = 5'000'000'000 + i * int64_t{33'333'333};
     const SE3 pose(Quat::Identity(), Vec3(std::cos(0.05 * i), 0, std::sin(0.05 * i)));
@@ -26,6 +27,7 @@ HtmlReport small_run() {
     FrameRecord frame;
     frame.timestamp_ns = time;
     frame.state = i == 0 ? FrameState::initializing : FrameState::tracked;
+    if (i == 0) frame.reason = "too <dark>";
     frame.tracking_ms = 12 + i % 5;
     content.frames.push_back(frame);
     content.scores.push_back({FrameId(i), time, 25 + 0.01 * i, 0.9});
@@ -71,6 +73,8 @@ TEST_F(HtmlReportTest, ShowsFiguresCurvesAndPairs) {
   EXPECT_THAT(page, HasSubstr("1\u202f234\u202f567"));
   EXPECT_THAT(page, HasSubstr("frame 60 · 25.60 dB · SSIM 0.900"));
   EXPECT_THAT(page, HasSubstr("nothing changed"));
+  EXPECT_THAT(page, HasSubstr("Note: the depth scale is a guess"));
+  EXPECT_THAT(page, HasSubstr("<td>too &lt;dark&gt;</td><td>1</td>"));
   EXPECT_EQ(count(page, "<svg class=\"plot\""), 3u);
   EXPECT_EQ(count(page, "<svg class=\"map\""), 1u);
   EXPECT_EQ(count(page, "class=\"mark\""), 1u) << "one frame without a pose";

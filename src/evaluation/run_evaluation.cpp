@@ -133,6 +133,7 @@ HtmlReport evaluate_run(const RunOutcome& run, const SystemOptions& options, Fra
                         const std::optional<Trajectory>& truth, bool with_images, Executor& executor) {
   HtmlReport html;
   html.title = source.info().name;
+  html.notes = source.info().notes;
   html.frames = frame_log(run);
   summarize(html.frames, html.report);
   add_mapping_figures(run, html.report);

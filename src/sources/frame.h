@@ -32,7 +32,7 @@ struct Frame {
 
 /// What a source knows before its first frame.
 struct SourceInfo {
-  std::string name;    ///< For people: format and folder.
+  std::string name;    ///< For people: folder and format.
   std::string format;  ///< "tum", "replica", …
   SensorKind sensor = SensorKind::rgbd;
   PinholeCamera camera;  ///< Raw intrinsics; with a distortion, those of the distorted image.

@@ -191,7 +191,7 @@ TEST_F(OpenSourceTest, AnOtherCameraCanBeNamed) {
   EXPECT_EQ(open_source(folder, {.format = "auto", .camera = folder / "other.yaml"}).value()->info().camera.fx, 99);
   write("other.yaml", "width: 640\nheight: 480\nfx: 1\nfy: 1\ncx: 1\ncy: 1\n");
   EXPECT_THAT(failure({.format = "auto", .camera = folder / "other.yaml"}),
-              HasSubstr("has 16x12 pixels, but the camera of TUM RGB-D sequence"));
+              HasSubstr("(TUM RGB-D) is calibrated for 640x480"));
 }
 
 TEST_F(OpenSourceTest, CamParamsAreChecked) {

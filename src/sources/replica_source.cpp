@@ -117,7 +117,7 @@ Result<std::unique_ptr<FrameSource>> open_replica(const fs::path& folder, const 
 
   SourceInfo info;
   info.format = "replica";
-  info.name = fmt::format("Replica sequence {}", folder.string());
+  info.name = fmt::format("{} (Replica)", scene_folder(folder).filename().string());
   info.camera = camera->camera;
   info.distortion = camera->distortion;
   constexpr double kDefaultDepthScale = 6553.5;

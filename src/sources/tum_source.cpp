@@ -159,7 +159,7 @@ bool looks_like_tum(const fs::path& folder) {
 Result<std::unique_ptr<FrameSource>> open_tum(const fs::path& folder, const fs::path& camera_file) {
   SourceInfo info;
   info.format = "tum";
-  info.name = fmt::format("TUM RGB-D sequence {}", folder.string());
+  info.name = fmt::format("{} (TUM RGB-D)", fs::weakly_canonical(folder).filename().string());
   const Result<CameraFile> camera = find_camera(folder, camera_file, info.notes);
   if (!camera) return camera.error();
   const std::optional<fs::path> associations = find_associations(folder);

@@ -4,7 +4,9 @@
 
 #include <fmt/format.h>
 
-#include <iterator>
+#include <algorithm>
+#include <map>
+#include <utility>
 #include <variant>
 
 #include "evaluation/html/markup.h"
@@ -32,7 +34,7 @@ std::string show(const Count& count) {
 class Table {
  public:
   explicit Table(const char* caption) : html_(fmt::format("<table><caption>{}</caption>\n", caption)) {}
-  Table& row(const char* name, const std::string& value) {
+  Table& row(std::string_view name, const std::string& value) {
     html_ += fmt::format("<tr><td>{}</td><td>{}</td></tr>\n", name, value);
     return *this;
   }
@@ -72,6 +74,26 @@ std::string frames_table(const Report::Frames& frames) {
       .row("of these before the first pose", show(frames.lost_before_init))
       .row("dropped", show(frames.dropped))
       .text();
+}
+
+/// Why frames have no pose, the most frequent reasons first.
+std::string reasons(const FrameLog& log) {
+  std::map<std::string, int64_t> counts;
+  for (const FrameRecord& frame : log) {
+    if (frame.state == FrameState::tracked) continue;
+    ++counts[frame.reason.empty() ? to_string(frame.state) : frame.reason];
+  }
+  if (counts.empty()) return {};
+  std::vector<std::pair<int64_t, std::string>> ordered;
+  for (const auto& [reason, count] : counts) ordered.emplace_back(-count, reason);
+  std::ranges::sort(ordered);
+  constexpr size_t kShown = 8;
+  Table table("Frames without a pose");
+  for (size_t i = 0; i < std::min(kShown, ordered.size()); ++i) {
+    table.row(escape(ordered[i].second), show(Count(-ordered[i].first)));
+  }
+  if (ordered.size() > kShown) table.row("other reasons", show(Count(static_cast<int64_t>(ordered.size() - kShown))));
+  return table.text();
 }
 
 std::string tracking_table(const Report& report) {
@@ -150,7 +172,9 @@ std::string tiles(const Report& report) {
                  fmt::format("to track a frame, 99 % within {}", show(report.tracking.p99_ms, 0, "ms")));
   }
   if (report.ate.rmse_m) html += tile(show(report.ate.rmse_m, 2, "", 100), "cm", "position error (ATE RMSE)");
-  if (report.image_online.psnr_db) html += tile(show(report.image_online.psnr_db, 2, ""), "dB", "PSNR online");
+  if (report.image_online.psnr_db && report.image_online.psnr_db != report.image.psnr_db) {
+    html += tile(show(report.image_online.psnr_db, 2, ""), "dB", "PSNR online");
+  }
   if (report.image.psnr_db) {
     html += tile(show(report.image.psnr_db, 2, ""), "dB",
                  fmt::format("PSNR of the final map, SSIM {}", show(report.image.ssim, 3, "")));
@@ -158,9 +182,9 @@ std::string tiles(const Report& report) {
   return html + "</div>\n";
 }
 
-std::string tables(const Report& report) {
+std::string tables(const Report& report, const FrameLog& log) {
   std::string html = "<div class=\"tables\">\n";
-  html += frames_table(report.frames) + tracking_table(report);
+  html += frames_table(report.frames) + reasons(log) + tracking_table(report);
   if (report.ate.rmse_m) html += trajectory_table("Final trajectory", report.ate);
   if (report.ate_online.rmse_m) html += trajectory_table("Trajectory as published online", report.ate_online);
   if (report.rpe.trans_m) {

@@ -15,8 +15,8 @@ std::string lead(const Report& report);
 /// The handful of figures to look at first.
 std::string tiles(const Report& report);
 
-/// All figures, in groups.
-std::string tables(const Report& report);
+/// All figures, in groups, and why frames of the log have no pose.
+std::string tables(const Report& report, const FrameLog& log);
 
 /// The configuration: what was changed, and everything folded away.
 std::string configuration(const Report& report);

@@ -23,7 +23,7 @@ h2 { font-size: 17px; font-weight: 600; margin: 56px 0 4px; }
 p { margin: 0 0 14px; max-width: 68ch; }
 .lead, .note, figcaption, footer { color: var(--soft); }
 .lead { margin-top: 8px; }
-.note, figcaption { font-size: 13px; }
+.note, figcaption { font-size: 13px; max-width: none; }
 .tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(170px, 1fr)); margin: 36px 0 0;
   border-top: 1px solid var(--line); border-bottom: 1px solid var(--line); }
 .tile { padding: 16px 16px 14px 0; }
@@ -42,15 +42,14 @@ svg.map { max-width: 720px; margin: 0 auto; }
 .grid { stroke: var(--line); } .axis { stroke: var(--soft); } .bar { stroke: var(--ink); fill: none; }
 .level { stroke: var(--soft); stroke-dasharray: 4 4; fill: none; } .mark { stroke: var(--estimate); stroke-width: 1.5; }
 .tick { font-size: 12px; fill: var(--soft); }
-.level-label { paint-order: stroke; stroke: var(--paper); stroke-width: 4px; stroke-linejoin: round; }
 .key { display: inline-block; width: 22px; height: 0; border-top: 3px solid; vertical-align: 4px; margin: 0 7px 0 16px; }
 .key:first-child { margin-left: 0; }
 .key.truth { border-color: var(--truth); } .key.estimate { border-color: var(--estimate); }
 .pair { display: grid; grid-template-columns: 1fr 1fr; gap: 6px; }
 .pair img { display: block; width: 100%; height: auto; border-radius: 3px; background: var(--panel); }
 .pairs figure { margin: 18px 0 0; } .pairs figcaption { margin-top: 6px; }
-.tables { display: grid; grid-template-columns: repeat(auto-fit, minmax(290px, 1fr)); gap: 26px 44px; margin-top: 14px;
-  align-items: start; }
+.tables { columns: 3 280px; column-gap: 44px; margin-top: 14px; }
+.tables table { break-inside: avoid; margin-bottom: 26px; }
 table { border-collapse: collapse; width: 100%; font-size: 14px; }
 caption { text-align: left; font-weight: 600; font-size: 14px; padding: 0 0 5px; }
 td { padding: 5px 0; border-top: 1px solid var(--line); vertical-align: top; }

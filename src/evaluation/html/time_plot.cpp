@@ -16,7 +16,7 @@ namespace {
 
 // The picture in its own units; the page scales it.
 constexpr double kWidth = 1000, kHeight = 220;
-constexpr double kLeft = 46, kRight = 8, kTop = 12, kBottom = 26;
+constexpr double kLeft = 46, kRight = 92, kTop = 12, kBottom = 26;
 
 /// Writes the parts of one plot.
 class Drawing {
@@ -67,8 +67,8 @@ class Drawing {
   void draw_level() {
     if (!plot_.level) return;
     add("<path class=\"level\" d=\"M{} {:.1f}H{}\"/>", kLeft, y(*plot_.level), kWidth - kRight);
-    add("<text class=\"tick level-label\" text-anchor=\"end\" x=\"{}\" y=\"{:.1f}\">{}</text>", kWidth - kRight - 2,
-        y(*plot_.level) - 5, escape(plot_.level_label));
+    add("<text class=\"tick\" x=\"{}\" y=\"{:.1f}\">{}</text>", kWidth - kRight + 8, y(*plot_.level) + 4,
+        escape(plot_.level_label));
   }
 
   std::string curve() const {

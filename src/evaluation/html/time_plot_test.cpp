@@ -26,8 +26,8 @@ TEST(TimePlot, MapsValuesIntoTheFrameAndBreaksAtGaps) {
   plot.high = 100;
   plot.end_s = 10;
   plot.points = {{0, 0}, {1, 50}, {2, 1000}, {8, 100}, {9, 100}, {10, 100}};
-  // Left axis at 46, right end at 992, top 12, bottom 194; 1000 is cut off at the top.
-  EXPECT_THAT(draw(plot), HasSubstr("d=\"M46.0 194.0L140.6 103.0L235.2 12.0M802.8 12.0L897.4 12.0L992.0 12.0\""));
+  // Left end at 46, right end at 908, top 12, bottom 194; 1000 is cut off at the top.
+  EXPECT_THAT(draw(plot), HasSubstr("d=\"M46.0 194.0L132.2 103.0L218.4 12.0M735.6 12.0L821.8 12.0L908.0 12.0\""));
   EXPECT_THAT(draw(plot), Not(HasSubstr("class=\"level\"")));
 }
 
@@ -38,7 +38,7 @@ TEST(TimePlot, ShowsLevelAndMarks) {
   plot.marks = {0.25, 0.75};
   const std::string svg = draw(plot);
   EXPECT_THAT(svg, HasSubstr("median &lt;0.5&gt;"));
-  EXPECT_THAT(svg, HasSubstr("<path class=\"mark\" d=\"M282.5 194.0v-7\"/>"));
+  EXPECT_THAT(svg, HasSubstr("<path class=\"mark\" d=\"M261.5 194.0v-7\"/>"));
 }
 
 }  // namespace
