@@ -233,6 +233,30 @@ struct ScreenGradients {
   Vec3 color{};
 };
 
+/// Adds the gradients of the harmonics; returns dL/d(mean − camera centre) in the anchor frame.
+Vec3 color_backward(const Parameters& g, const View& view, const Projected& p, const Pose& pose, const Vec3& color,
+                    Parameters& out) {
+  const Vec3 center = camera_center(pose);
+  const Vec3 d{g[0] - center[0], g[1] - center[1], g[2] - center[2]};
+  const double norm = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+  const Vec3 n{d[0] / norm, d[1] / norm, d[2] / norm};
+  const auto y = basis(n[0], n[1], n[2]);
+  const auto dy = basis_gradient(n);
+  Vec3 dn{};
+  const int count = (view.sh_degree + 1) * (view.sh_degree + 1);
+  for (int c = 0; c < 3; ++c) {
+    if (p.clamped[c]) continue;
+    for (int i = 0; i < count; ++i) {
+      out[11 + 3 * i + c] += y[i] * color[c];
+      for (int axis = 0; axis < 3; ++axis) dn[axis] += color[c] * g[11 + 3 * i + c] * dy[i][axis];
+    }
+  }
+  const double radial = dn[0] * n[0] + dn[1] * n[1] + dn[2] * n[2];
+  Vec3 dd{};
+  for (int i = 0; i < 3; ++i) dd[i] = (dn[i] - n[i] * radial) / norm;
+  return dd;
+}
+
 void geometry_backward(const Gaussian& gaussian, const View& view, const Projected& p, const ScreenGradients& s,
                        Parameters& out, std::array<double, 6>& pose_gradient) {
   const Parameters& g = gaussian.parameters;
@@ -274,26 +298,7 @@ void geometry_backward(const Gaussian& gaussian, const View& view, const Project
     dp[2] += dj[1][2] * view.fy / z * p.camera[1] / (z * z);
   }
 
-  // Viewing direction.
-  const Vec3 center = camera_center(pose);
-  const Vec3 d{g[0] - center[0], g[1] - center[1], g[2] - center[2]};
-  const double norm = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-  const Vec3 n{d[0] / norm, d[1] / norm, d[2] / norm};
-  const auto y = basis(n[0], n[1], n[2]);
-  const auto dy = basis_gradient(n);
-  Vec3 dn{};
-  const int count = (view.sh_degree + 1) * (view.sh_degree + 1);
-  for (int c = 0; c < 3; ++c) {
-    if (p.clamped[c]) continue;
-    for (int i = 0; i < count; ++i) {
-      out[11 + 3 * i + c] += y[i] * s.color[c];
-      for (int axis = 0; axis < 3; ++axis) dn[axis] += s.color[c] * g[11 + 3 * i + c] * dy[i][axis];
-    }
-  }
-  const double radial = dn[0] * n[0] + dn[1] * n[1] + dn[2] * n[2];
-  Vec3 dd{};
-  for (int i = 0; i < 3; ++i) dd[i] = (dn[i] - n[i] * radial) / norm;
-
+  const Vec3 dd = color_backward(g, view, p, pose, s.color, out);
   Vec3 dd_camera{};
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
