@@ -7,10 +7,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <memory>
 #include <vector>
 
 #include "base/nearest_name.h"
 #include "base/version.h"
+#include "help_formatter.h"
 
 namespace photoslam {
 namespace {
@@ -52,6 +54,7 @@ CommandLine::CommandLine()
           "Real-time SLAM that leaves behind a photorealistic map of gaussians.\n"
           "Start with: photoslam doctor, then photoslam run <dataset> --output DIR",
           "photoslam") {
+  app_.formatter(std::make_shared<HelpFormatter>());
   app_.require_subcommand(1);
   app_.set_help_flag("-h,--help", "Print this help and exit");
   app_.set_version_flag("--version", fmt::format("photoslam {} ({})", version(), build_description()));
@@ -61,7 +64,6 @@ CommandLine::CommandLine()
 CLI::App& CommandLine::add(const std::string& name, const std::string& description, const std::string& examples) {
   CLI::App& command = *app_.add_subcommand(name, description);
   command.set_help_flag("-h,--help", "Print this help and exit");
-  command.get_formatter()->column_width(40);
   command.footer("Examples:\n" + examples);
   return command;
 }

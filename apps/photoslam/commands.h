@@ -13,6 +13,7 @@ void add_run(CommandLine& line);
 void add_eval(CommandLine& line);
 void add_render(CommandLine& line);
 void add_synth(CommandLine& line);
+void add_bench(CommandLine& line);
 void add_doctor(CommandLine& line);
 void add_config(CommandLine& line);
 

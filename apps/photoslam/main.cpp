@@ -8,6 +8,7 @@ int main(int argc, char** argv) {
   photoslam::add_eval(line);
   photoslam::add_render(line);
   photoslam::add_synth(line);
+  photoslam::add_bench(line);
   photoslam::add_doctor(line);
   photoslam::add_config(line);
   return line.run(argc, argv);

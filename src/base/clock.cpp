@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <ctime>
+#include <fstream>
 
 namespace photoslam {
 namespace {
@@ -26,6 +27,13 @@ double peak_rss_mb() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<double>(usage.ru_maxrss) * 1024e-6;
+}
+
+double current_rss_mb() {
+  std::ifstream statm("/proc/self/statm");
+  long total = 0, resident = 0;
+  if (!(statm >> total >> resident)) return 0;
+  return 1e-6 * static_cast<double>(resident) * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
 void lower_thread_priority() {

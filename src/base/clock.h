@@ -23,6 +23,8 @@ double thread_cpu_seconds();
 double process_cpu_seconds();
 /// Largest resident set so far [MB, 1e6 bytes].
 double peak_rss_mb();
+/// Resident set now [MB]; 0 where the system does not tell.
+double current_rss_mb();
 /// Lowers the calling thread's scheduling priority for good (nice 10); without effect where not supported.
 void lower_thread_priority();
 
