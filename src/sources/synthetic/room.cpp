@@ -4,20 +4,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "base/check.h"
 #include "sources/synthetic/furniture/furniture.h"
+#include "sources/synthetic/lighting/light_map.h"
 
 namespace photoslam {
 
 using synthetic::Color;
-using synthetic::Material;
-using synthetic::Patch;
 using synthetic::RayTracer;
 using synthetic::Triangle;
 using synthetic::Vec2f;
 using synthetic::Vec3f;
-using synthetic::Vertex;
 
 namespace {
 
@@ -41,6 +40,28 @@ float fresnel(float at_normal, float cosine) {
   return at_normal + (1 - at_normal) * m2 * m2 * m;
 }
 
+/// What lens and colour filter do to a sharp image: every pixel gives a little of its light to its neighbours.
+ImageF soften(const ImageF& sharp, Executor& executor) {
+  constexpr float kShare = 0.14f;  // for each neighbour along a row or column
+  const int width = sharp.width(), height = sharp.height();
+  ImageF soft(width, height, 3);
+  executor.for_each(height, [&](int y, int) {
+    const float* row = sharp.row(y);
+    const float* above = sharp.row(std::max(y - 1, 0));
+    const float* below = sharp.row(std::min(y + 1, height - 1));
+    std::vector<float> column(static_cast<size_t>(3 * width));
+    for (int i = 0; i < 3 * width; ++i) {
+      column[static_cast<size_t>(i)] = (1 - 2 * kShare) * row[i] + kShare * (above[i] + below[i]);
+    }
+    for (int i = 0; i < 3 * width; ++i) {
+      const size_t left = static_cast<size_t>(i < 3 ? i : i - 3),
+                   right = static_cast<size_t>(i + 3 < 3 * width ? i + 3 : i);
+      soft.row(y)[i] = (1 - 2 * kShare) * column[static_cast<size_t>(i)] + kShare * (column[left] + column[right]);
+    }
+  });
+  return soft;
+}
+
 }  // namespace
 
 struct SyntheticRoom::State {
@@ -48,8 +69,10 @@ struct SyntheticRoom::State {
   RayTracer tracer;
   synthetic::LightMap light;
 
-  State(synthetic::RoomModel m, Executor& executor)
-      : model(std::move(m)), tracer(model.mesh), light(model.mesh, model.textures, tracer, model.lights, executor) {}
+  State(synthetic::RoomModel m, RoomQuality quality, Executor& executor)
+      : model(std::move(m)),
+        tracer(model.mesh),
+        light(model.mesh, model.textures, tracer, model.lights, quality == RoomQuality::full ? 2 : 1, executor) {}
 
   void render_colors(const Eye& eye, int y, RoomView& view) const;
   void measure_geometry(const Eye& eye, int y, RoomView& view) const;
@@ -92,15 +115,9 @@ Color SyntheticRoom::State::shade(const RayTracer::Hits& hits, int ray, const Ve
                                   float focal) const {
   const size_t k = static_cast<size_t>(ray);
   if (hits.triangle[k] < 0) return outside(origin, direction);
-  const Triangle& triangle = model.mesh.triangles[static_cast<size_t>(hits.triangle[k])];
-  const Patch& patch = model.mesh.patches[triangle.patch];
-  const Material& material = model.mesh.materials[static_cast<size_t>(patch.material)];
-  const Vertex &a = model.mesh.vertices[triangle.vertices[0]], &b = model.mesh.vertices[triangle.vertices[1]],
-               &c = model.mesh.vertices[triangle.vertices[2]];
-  const float wb = hits.u[k], wc = hits.v[k], wa = 1 - wb - wc;
-  const Vec2f uv = wa * a.uv + wb * b.uv + wc * c.uv;
+  const synthetic::Mesh::Hit hit = model.mesh.hit(hits.triangle[k], hits.u[k], hits.v[k]);
   const Vec3f view = -direction.normalized();
-  Vec3f normal = (wa * a.normal + wb * b.normal + wc * c.normal).normalized();
+  Vec3f normal = hit.normal;
   float cosine = normal.dot(view);
   if (cosine < 0) {
     normal = -normal;
@@ -111,19 +128,18 @@ Color SyntheticRoom::State::shade(const RayTracer::Hits& hits, int ray, const Ve
   // One of the samples stands for half a pixel across, and for a quarter of the pixel's length on a slanted surface.
   const float across = hits.distance[k] / focal;
   const float footprint = std::max(0.8f * across, std::min(0.4f * across / cosine, 2 * across));
-  const Vec2f place =
-      patch.texture_origin + (patch.swap_uv ? Vec2f(uv.y(), uv.x()) : uv).cwiseProduct(patch.texture_size);
-  const Color albedo = model.textures[static_cast<size_t>(material.texture)].sample(place.x(), place.y(),
-                                                                                    footprint * patch.texture_metres);
-  const Color incoming = light.sample(patch, uv);
-  Color out = albedo * (incoming + material.emission);
-  const float gloss = material.gloss * albedo[3];
+  const Vec2f place = hit.patch.texture_place(hit.uv);
+  const Color albedo = model.textures[static_cast<size_t>(hit.material.texture)].sample(
+      place.x(), place.y(), footprint * hit.patch.texture_metres);
+  const Color incoming = light.sample(hit.patch, hit.uv);
+  Color out = albedo * (incoming + hit.material.emission);
+  const float gloss = hit.material.gloss * albedo[3];
   if (gloss > 0.004f) {
     const Vec3f position = origin + hits.distance[k] * direction;
     const Vec3f reflected = 2 * normal.dot(view) * normal - view;
-    const float reflectance = fresnel(gloss, cosine) * (1 - material.roughness);
+    const float reflectance = fresnel(gloss, cosine) * (1 - hit.material.roughness);
     // Apart from the window, a surface mirrors about as much light as falls on it.
-    out += reflectance * (0.8f * incoming + mirrored_light(position, reflected, material.roughness, incoming[3]));
+    out += reflectance * (0.8f * incoming + mirrored_light(position, reflected, hit.material.roughness, incoming[3]));
   }
   return out;
 }
@@ -194,8 +210,9 @@ void SyntheticRoom::State::measure_geometry(const Eye& eye, int y, RoomView& vie
   }
 }
 
-SyntheticRoom::SyntheticRoom(uint64_t seed, Executor& executor)
-    : state_(std::make_unique<const State>(synthetic::furnish_room(seed, size(), executor), executor)) {}
+SyntheticRoom::SyntheticRoom(uint64_t seed, Executor& executor, RoomQuality quality)
+    : state_(
+          std::make_unique<const State>(synthetic::furnish_room(seed, size(), quality, executor), quality, executor)) {}
 SyntheticRoom::~SyntheticRoom() = default;
 SyntheticRoom::SyntheticRoom(SyntheticRoom&&) noexcept = default;
 SyntheticRoom& SyntheticRoom::operator=(SyntheticRoom&&) noexcept = default;
@@ -212,6 +229,7 @@ RoomView SyntheticRoom::render(const SE3& world_from_camera, const PinholeCamera
     state_->render_colors(eye, y, view);
     state_->measure_geometry(eye, y, view);
   });
+  view.radiance = soften(view.radiance, executor);
   return view;
 }
 

@@ -20,6 +20,9 @@ struct RoomView {
       incidence;  ///< Cosine of the angle between the ray through the pixel centre and the surface normal, in [0, 1].
 };
 
+/// Draft: the same room with coarser textures and light, made in a tenth of the time; for tests of other things.
+enum class RoomQuality { full, draft };
+
 /// A furnished living room with ray-traced images and exact depth.
 ///
 /// World axes: x along the room, y across, z up, in metres; the room is the box from the origin to size().
@@ -27,7 +30,7 @@ struct RoomView {
 class SyntheticRoom {
  public:
   /// Builds textures and furniture and computes the light; takes seconds.
-  SyntheticRoom(uint64_t seed, Executor& executor);
+  SyntheticRoom(uint64_t seed, Executor& executor, RoomQuality quality = RoomQuality::full);
   ~SyntheticRoom();
   SyntheticRoom(SyntheticRoom&&) noexcept;
   SyntheticRoom& operator=(SyntheticRoom&&) noexcept;

@@ -97,8 +97,8 @@ void floor_lamp(Workshop& w, const SE3& frame) {
   w.lights.areas.push_back({.center = glow.cast<float>(), .radius = 0.24f, .radiance = Color(1.7f, 1.25f, 0.75f, 0)});
 }
 
-RoomModel furnish_room(uint64_t seed, const Vec3& size, Executor& executor) {
-  Workshop w(seed);
+RoomModel furnish_room(uint64_t seed, const Vec3& size, RoomQuality quality, Executor& executor) {
+  Workshop w(seed, quality);
   shell(w, size);
   carpet(w, place(1.2, 1.05, 0, 3), 2.5, 1.7);
 

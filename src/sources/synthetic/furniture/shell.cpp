@@ -24,10 +24,10 @@ void walls(Workshop& w, const Vec3& size) {
   const int south = w.material(fx, fz, 220, plaster(rgb(0x9FAA98), w.seed()), {.gloss = 0.01f});
   const int ceiling = w.material(2.0f, 2.0f, 120, plaster(rgb(0xE9E4DA), w.seed()), {.gloss = 0});
 
-  mesh.rectangle(origin, Vec3(0, y, 0), Vec3(x, 0, 0), Vec3(0, -y, 0), Cover(floor, fill, 0.02));
-  mesh.rectangle(origin, Vec3(0, y, z), Vec3(x, 0, 0), Vec3(0, 0, -z), Cover(brick, fill, 0.03));
-  mesh.rectangle(origin, Vec3(0, 0, z), Vec3(0, y, 0), Vec3(0, 0, -z), Cover(paper, fill, 0.03));
-  mesh.rectangle(origin, Vec3(x, 0, z), Vec3(-x, 0, 0), Vec3(0, 0, -z), Cover(south, fill, 0.03));
+  mesh.rectangle(origin, Vec3(0, y, 0), Vec3(x, 0, 0), Vec3(0, -y, 0), Cover(floor, fill, 0.025));
+  mesh.rectangle(origin, Vec3(0, y, z), Vec3(x, 0, 0), Vec3(0, 0, -z), Cover(brick, fill, 0.04));
+  mesh.rectangle(origin, Vec3(0, 0, z), Vec3(0, y, 0), Vec3(0, 0, -z), Cover(paper, fill, 0.04));
+  mesh.rectangle(origin, Vec3(x, 0, z), Vec3(-x, 0, 0), Vec3(0, 0, -z), Cover(south, fill, 0.04));
   mesh.rectangle(origin, Vec3(0, 0, z), Vec3(x, 0, 0), Vec3(0, y, 0), Cover(ceiling, Cover::Fit::random, 0.06));
   // The east wall leaves the window open.
   const Cover cover(plastered, Cover::Fit::aligned, 0.03);

@@ -6,7 +6,9 @@
 
 namespace photoslam::synthetic {
 
-Workshop::Workshop(uint64_t seed) : mesh_(seed) {
+Workshop::Workshop(uint64_t seed, RoomQuality quality)
+    : texture_scale_(quality == RoomQuality::full ? 1.0f : 0.3f),
+      mesh_(seed, quality == RoomQuality::full ? 1.0 : 4.0) {
   const Finish varnish{.gloss = 0.045f, .roughness = 0.18f};
   oak = material(1.3f, 0.6f, 500, wood(rgb(0xCFA56E), rgb(0x8A5A32), this->seed()), varnish);
   walnut = material(1.3f, 0.6f, 500, wood(rgb(0x8E6242), rgb(0x3E2618), this->seed()), varnish);
@@ -32,7 +34,7 @@ int Workshop::material(float width, float height, float texels_per_metre, Shader
   m.roughness = finish.roughness;
   m.emission = finish.emission;
   m.translucency = finish.translucency;
-  jobs_.push_back({width, height, texels_per_metre, std::move(shader)});
+  jobs_.push_back({width, height, texture_scale_ * texels_per_metre, std::move(shader)});
   return mesh_.add_material(m, Vec2f(width, height));
 }
 

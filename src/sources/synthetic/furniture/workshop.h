@@ -6,6 +6,7 @@
 
 #include "sources/synthetic/geometry/shapes.h"
 #include "sources/synthetic/lighting/light.h"
+#include "sources/synthetic/room.h"
 #include "sources/synthetic/textures/shaders.h"
 
 namespace photoslam::synthetic {
@@ -30,7 +31,7 @@ struct RoomModel {
 /// Where furniture is made: shapes, materials and chance. Textures are painted at the end, all together.
 class Workshop {
  public:
-  explicit Workshop(uint64_t seed);
+  Workshop(uint64_t seed, RoomQuality quality);
 
   /// A material with a texture of its own. Returns its index.
   int material(float width, float height, float texels_per_metre, Shader shader, const Finish& finish = {});
@@ -53,6 +54,7 @@ class Workshop {
     float width, height, texels_per_metre;
     Shader shader;
   };
+  float texture_scale_;  ///< Texels per wanted texel, along each axis.
   MeshBuilder mesh_;
   std::vector<Job> jobs_;
 };

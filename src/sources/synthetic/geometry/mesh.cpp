@@ -36,4 +36,13 @@ Mesh::Surface Mesh::surface(const Patch& patch, float u, float v) const {
           blend(v00.normal, v10.normal, v01.normal, v11.normal).normalized()};
 }
 
+Mesh::Hit Mesh::hit(int32_t triangle, float second, float third) const {
+  const Triangle& t = triangles[static_cast<size_t>(triangle)];
+  const Vertex &a = vertices[t.vertices[0]], &b = vertices[t.vertices[1]], &c = vertices[t.vertices[2]];
+  const float first = 1 - second - third;
+  const Patch& patch = patches[t.patch];
+  return {patch, materials[static_cast<size_t>(patch.material)], first * a.uv + second * b.uv + third * c.uv,
+          (first * a.normal + second * b.normal + third * c.normal).normalized()};
+}
+
 }  // namespace photoslam::synthetic

@@ -43,6 +43,11 @@ struct Patch {
   size_t light_offset = 0;                ///< Index of the first node among those of all patches.
   int columns = 2, rows = 2;              ///< Grid of vertices.
   size_t first_vertex = 0;
+
+  /// Place in the texture [m] of (u, v).
+  Vec2f texture_place(const Vec2f& uv) const {
+    return texture_origin + (swap_uv ? Vec2f(uv.y(), uv.x()) : uv).cwiseProduct(texture_size);
+  }
 };
 
 struct Triangle {
@@ -63,6 +68,16 @@ struct Mesh {
   };
   /// The point (u, v) of a patch, bilinear between its vertices.
   Surface surface(const Patch& patch, float u, float v) const;
+
+  /// What a ray has hit.
+  struct Hit {
+    const Patch& patch;
+    const Material& material;
+    Vec2f uv;
+    Vec3f normal;  ///< Of unit length, pointing outwards.
+  };
+  /// The point of a triangle with the given weights of its second and third vertex.
+  Hit hit(int32_t triangle, float second, float third) const;
 };
 
 }  // namespace photoslam::synthetic

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "base/check.h"
 
@@ -38,6 +39,12 @@ std::vector<Vec3> grid_normals(int columns, int rows, const std::vector<Vec3>& p
       const Vec3 dv = direction(at(c, std::max(r - 1, 0)), at(c, r), at(c, std::min(r + 1, rows - 1)));
       const Vec3 normal = dv.cross(du);
       normals.push_back(normal.norm() > 1e-9 ? Vec3(normal.normalized()) : Vec3::UnitZ());
+    }
+    // All points of a pole share one normal.
+    const auto row = normals.end() - columns;
+    if ((at(0, r) - at(columns / 2, r)).norm() < 1e-9) {
+      const Vec3 mean = std::accumulate(row, normals.end(), Vec3(Vec3::Zero())).normalized();
+      std::fill(row, normals.end(), mean);
     }
   }
   return normals;
@@ -90,8 +97,8 @@ void MeshBuilder::patch(const SE3& world_from_object, int columns, int rows, con
   patch.columns = columns;
   patch.rows = rows;
   patch.first_vertex = mesh_.vertices.size();
-  patch.light_width = light_nodes(us.back(), cover.light_spacing);
-  patch.light_height = light_nodes(vs.back(), cover.light_spacing);
+  patch.light_width = light_nodes(us.back(), light_coarseness_ * cover.light_spacing);
+  patch.light_height = light_nodes(vs.back(), light_coarseness_ * cover.light_spacing);
   patch.light_offset = mesh_.light_nodes;
   mesh_.light_nodes += static_cast<size_t>(patch.light_width) * static_cast<size_t>(patch.light_height);
   map_texture(patch, Vec2(us.back(), vs.back()).cast<float>(), cover);

@@ -39,7 +39,9 @@ struct BoxCovers {
 /// Collects surfaces into a mesh. Sizes in metres.
 class MeshBuilder {
  public:
-  explicit MeshBuilder(uint64_t seed) : random_(seed) {}
+  /// Light map nodes are `light_coarseness` times as far apart as the covers want.
+  explicit MeshBuilder(uint64_t seed, double light_coarseness = 1)
+      : light_coarseness_(light_coarseness), random_(seed) {}
 
   /// `texture_size` is the extent [m] of the material's texture. Returns the material's index.
   int add_material(const Material& material, const Vec2f& texture_size);
@@ -73,6 +75,7 @@ class MeshBuilder {
 
   Mesh mesh_;
   std::vector<Vec2f> texture_sizes_;  // per material
+  double light_coarseness_;
   Random random_;
 };
 

@@ -2,13 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <span>
 #include <vector>
 
-#include "base/executor.h"
 #include "sources/synthetic/geometry/mesh.h"
-#include "sources/synthetic/geometry/ray_tracer.h"
-#include "sources/synthetic/textures/texture.h"
 
 namespace photoslam::synthetic {
 
@@ -21,8 +17,10 @@ struct AreaLight {
   Color radiance{1, 1, 1, 0};
 
   bool is_ball() const { return radius > 0; }
+  /// Area [m²] of the rectangle, or of the disc that a ball looks like.
   float area() const;
-  /// Place for a, b in [-1, 1] as seen from a point: on the rectangle, or on the ball's disc that faces the point.
+  /// Place for a, b in [-1, 1] as seen from a point: on the rectangle, or on the disc before the ball that faces the
+  /// point.
   Vec3f point(float a, float b, const Vec3f& seen_from) const;
 };
 
@@ -30,7 +28,7 @@ struct AreaLight {
 struct SunLight {
   Vec3f towards{0, 0, 1};        ///< Unit vector to the sun.
   float radius = 0.02f;          ///< Angular radius [rad]; wider than the real sun's through haze.
-  Color irradiance{1, 1, 1, 0};  ///< On a surface that faces the sun.
+  Color irradiance{0, 0, 0, 0};  ///< On a surface that faces the sun.
 };
 
 struct Lights {
@@ -38,20 +36,8 @@ struct Lights {
   SunLight sun;
 };
 
-/// Light that arrives at the surfaces, computed once: direct light with soft shadows and two bounces.
-class LightMap {
- public:
-  LightMap(const Mesh& mesh, std::span<const Texture> textures, const RayTracer& tracer, const Lights& lights,
-           Executor& executor);
-
-  /// Irradiance / π, that is the radiance of a white surface, at (u, v) of a patch; the fourth value is the visible
-  /// share of the first area light.
-  Color sample(const Patch& patch, const Vec2f& uv) const { return sample(nodes_, patch, uv); }
-
- private:
-  static Color sample(const std::vector<Color>& nodes, const Patch& patch, const Vec2f& uv);
-
-  std::vector<Color> nodes_;
-};
+/// Two axes orthogonal to a unit vector and to each other. Source: Duff et al., "Building an orthonormal basis,
+/// revisited", 2017.
+std::pair<Vec3f, Vec3f> orthogonal_axes(const Vec3f& normal);
 
 }  // namespace photoslam::synthetic
