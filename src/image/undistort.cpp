@@ -2,40 +2,59 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "image/undistort.h"
 
+#include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
-
-#include "image/convert.h"
+#include <tuple>
+#include <utility>
 
 namespace photoslam {
+namespace {
+
+/// Splits a coordinate in [0, size − 1] into the first of two neighbours and 256ths of the way to the second.
+std::pair<uint16_t, uint16_t> split(double position, int size) {
+  const int first = std::min(static_cast<int>(position), size - 2);
+  return {static_cast<uint16_t>(first), static_cast<uint16_t>(std::lround((position - first) * 256))};
+}
+
+}  // namespace
 
 Undistorter::Undistorter(const PinholeCamera& camera, const Distortion& distortion)
-    : camera_(camera), mask_(camera.width, camera.height) {
-  source_.reserve(2 * mask_.values().size());
+    : camera_(camera), mask_(camera.width, camera.height), taps_(mask_.values().size()) {
+  PHOTOSLAM_CHECK(camera.width >= 2 && camera.height >= 2, "{}x{}", camera.width, camera.height);
+  Tap* tap = taps_.data();
   for (int y = 0; y < camera.height; ++y) {
-    for (int x = 0; x < camera.width; ++x) {
+    for (int x = 0; x < camera.width; ++x, ++tap) {
       const Vec2 ray((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy);
       Eigen::Matrix2d jacobian;
       const Vec2 bent = distort(distortion, ray, &jacobian);
       const Vec2 pixel(camera.fx * bent.x() + camera.cx, camera.fy * bent.y() + camera.cy);
       // Behind a fold of the model, rays would come back into the image that the lens never saw.
-      mask_(x, y) =
-          camera.contains(pixel) && jacobian(0, 0) + jacobian(1, 1) > 0 && jacobian.determinant() > 0 ? 255 : 0;
-      source_.push_back(static_cast<float>(pixel.x()));
-      source_.push_back(static_cast<float>(pixel.y()));
+      const bool in_order = jacobian.trace() > 0 && jacobian.determinant() > 0;
+      if (!camera.contains(pixel) || !in_order) continue;
+      mask_(x, y) = 255;
+      std::tie(tap->x, tap->fx) = split(pixel.x(), camera.width);
+      std::tie(tap->y, tap->fy) = split(pixel.y(), camera.height);
     }
   }
 }
 
 ImageU8 Undistorter::color(const ImageU8& distorted) const {
   PHOTOSLAM_CHECK(distorted.same_size(mask_), "{}x{}", distorted.width(), distorted.height());
-  ImageU8 result(camera_.width, camera_.height, distorted.channels());
-  const float* source = source_.data();
-  for (int y = 0; y < camera_.height; ++y) {
-    for (int x = 0; x < camera_.width; ++x, source += 2) {
-      if (mask_(x, y) == 0) continue;
-      for (int c = 0; c < distorted.channels(); ++c) {
-        result(x, y, c) = static_cast<uint8_t>(sample_bilinear(distorted, source[0], source[1], c) + 0.5f);
-      }
+  const int channels = distorted.channels();
+  ImageU8 result(camera_.width, camera_.height, channels);
+  const auto mask = mask_.values();
+  uint8_t* target = result.values().data();
+  for (size_t i = 0; i < taps_.size(); ++i, target += channels) {
+    if (mask[i] == 0) continue;
+    const Tap tap = taps_[i];
+    const uint8_t* const above = distorted.row(tap.y) + tap.x * channels;
+    const uint8_t* const below = distorted.row(tap.y + 1) + tap.x * channels;
+    const uint32_t left = 256u - tap.fx, right = tap.fx, up = 256u - tap.fy, down = tap.fy;
+    for (int c = 0; c < channels; ++c) {
+      const uint32_t sum =
+          up * (left * above[c] + right * above[c + channels]) + down * (left * below[c] + right * below[c + channels]);
+      target[c] = static_cast<uint8_t>((sum + (1u << 15)) >> 16);
     }
   }
   return result;
@@ -45,12 +64,11 @@ ImageU16 Undistorter::depth(const ImageU16& distorted) const {
   PHOTOSLAM_CHECK(distorted.same_size(mask_) && distorted.channels() == 1, "{}x{}x{}", distorted.width(),
                   distorted.height(), distorted.channels());
   ImageU16 result(camera_.width, camera_.height);
-  const float* source = source_.data();
-  for (int y = 0; y < camera_.height; ++y) {
-    for (int x = 0; x < camera_.width; ++x, source += 2) {
-      if (mask_(x, y) == 0) continue;
-      result(x, y) = distorted(static_cast<int>(source[0] + 0.5f), static_cast<int>(source[1] + 0.5f));
-    }
+  const auto mask = mask_.values();
+  const auto target = result.values();
+  for (size_t i = 0; i < taps_.size(); ++i) {
+    const Tap tap = taps_[i];
+    if (mask[i] != 0) target[i] = distorted(tap.x + (tap.fx >= 128 ? 1 : 0), tap.y + (tap.fy >= 128 ? 1 : 0));
   }
   return result;
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "camera/distortion.h"
@@ -28,9 +29,15 @@ class Undistorter {
   ImageU16 depth(const ImageU16& distorted) const;
 
  private:
+  /// Position in the distorted image: the upper left of four neighbours and the way to the others in 1/256 pixel.
+  struct Tap {
+    uint16_t x = 0, y = 0;
+    uint16_t fx = 0, fy = 0;  // 0…256
+  };
+
   PinholeCamera camera_;
   ImageU8 mask_;
-  std::vector<float> source_;  // [H, W, 2] position in the distorted image
+  std::vector<Tap> taps_;  // [H, W]
 };
 
 }  // namespace photoslam
