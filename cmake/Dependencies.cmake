@@ -4,18 +4,7 @@
 find_package(Threads REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 
-# OpenCV's CMake package comes only with its meta package, which drags in every module: look for ours one by one.
-find_path(OPENCV_INCLUDE_DIR opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
-foreach(module core imgproc features2d calib3d)
-  find_library(OPENCV_${module}_LIBRARY opencv_${module} REQUIRED)
-  add_library(opencv_${module} SHARED IMPORTED)
-  set_target_properties(opencv_${module} PROPERTIES
-    IMPORTED_LOCATION ${OPENCV_${module}_LIBRARY}
-    INTERFACE_INCLUDE_DIRECTORIES ${OPENCV_INCLUDE_DIR})
-endforeach()
-
 find_package(fmt REQUIRED)
-find_package(spdlog REQUIRED)
 find_package(JPEG REQUIRED)
 find_package(PNG REQUIRED)
 find_package(ZLIB REQUIRED)

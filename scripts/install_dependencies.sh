@@ -9,9 +9,7 @@ set -euo pipefail
 
 build_packages=(
   g++ cmake ninja-build ccache mold pkg-config python3 git ca-certificates
-  libeigen3-dev libhwy-dev libfmt-dev libspdlog-dev
-  libopencv-core-dev libopencv-imgproc-dev libopencv-features2d-dev libopencv-calib3d-dev
-  libjpeg-dev libpng-dev zlib1g-dev libzstd-dev
+  libeigen3-dev libhwy-dev libfmt-dev libjpeg-dev libpng-dev zlib1g-dev
   libcli11-dev libtomlplusplus-dev libyaml-cpp-dev nlohmann-json3-dev
   libembree-dev
 )

@@ -8,7 +8,6 @@
 #include <Eigen/Core>
 #include <filesystem>
 #include <fstream>
-#include <opencv2/core/version.hpp>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -68,8 +67,8 @@ Status report_machine() {
   print_row("processor", fmt::format("{}, {} cores usable", processor_name(), usable_cores()));
   print_row("memory", memory());
   print_row("SIMD", instruction_sets());
-  print_row("libraries", fmt::format("OpenCV {}, Eigen {}.{}.{}, Highway {}.{}.{}", CV_VERSION, EIGEN_WORLD_VERSION,
-                                     EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION, HWY_MAJOR, HWY_MINOR, HWY_PATCH));
+  print_row("libraries", fmt::format("Eigen {}.{}.{}, Highway {}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION,
+                                     EIGEN_MINOR_VERSION, HWY_MAJOR, HWY_MINOR, HWY_PATCH));
   print_row("splatting", "cpu: ready; cuda: not part of this build");
   print_row("input", "TUM RGB-D, Replica RGB-D; mono, stereo, video and live cameras: not part of this build");
   print_row("LPIPS", "not part of this build: image.lpips is null in reports");
