@@ -20,7 +20,7 @@ using synthetic::Vec3f;
 
 namespace {
 
-constexpr float kExposure = 1.3f;  // radiance of the image per radiance in the room
+constexpr float kExposure = 1.5f;  // radiance of the image per radiance in the room
 constexpr int kSamples = 4;        // rays per pixel, on a rotated grid
 constexpr double kSampleX[kSamples] = {-0.2, 0.6, 0.2, -0.6};
 constexpr double kSampleY[kSamples] = {-0.6, -0.2, 0.6, 0.2};
@@ -42,7 +42,7 @@ float fresnel(float at_normal, float cosine) {
 
 /// What lens and colour filter do to a sharp image: every pixel gives a little of its light to its neighbours.
 ImageF soften(const ImageF& sharp, Executor& executor) {
-  constexpr float kShare = 0.14f;  // for each neighbour along a row or column
+  constexpr float kShare = 0.12f;  // for each neighbour along a row or column
   const int width = sharp.width(), height = sharp.height();
   ImageF soft(width, height, 3);
   executor.for_each(height, [&](int y, int) {
