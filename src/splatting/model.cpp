@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "base/check.h"
 
@@ -247,8 +248,7 @@ void GaussianModel::sort_spatially() {
         low[i] = std::min(low[i], blocks_[b]->center[i] - blocks_[b]->radius);
         high[i] = std::max(high[i], blocks_[b]->center[i] + blocks_[b]->radius);
       }
-    std::vector<Record> records;
-    std::vector<std::pair<uint64_t, size_t>> order;
+    std::vector<std::pair<uint64_t, uint32_t>> order;
     for (uint32_t b : own)
       for (int lane = 0; lane < blocks_[b]->count; ++lane) {
         std::array<uint32_t, 3> cell{};
@@ -256,12 +256,29 @@ void GaussianModel::sort_spatially() {
           const float at = (blocks_[b]->parameters[row::kMean + i][lane] - low[i]) / (high[i] - low[i]);
           cell[i] = at > 0 ? static_cast<uint32_t>(std::min(at, 1.0f) * 2097151.0f) : 0;  // not a number: 0
         }
-        order.emplace_back(morton_code(cell), records.size());
-        records.push_back(take(*blocks_[b], lane));
+        order.emplace_back(morton_code(cell), static_cast<uint32_t>(order.size()));
       }
     std::sort(order.begin(), order.end());
-    for (size_t i = 0; i < order.size(); ++i)
-      put(*blocks_[own[i / kBlockSize]], static_cast<int>(i % kBlockSize), records[order[i].second]);
+    const auto take_nth = [&](size_t n) {
+      return take(*blocks_[own[n / kBlockSize]], static_cast<int>(n % kBlockSize));
+    };
+    const auto put_nth = [&](size_t n, const Record& record) {
+      put(*blocks_[own[n / kBlockSize]], static_cast<int>(n % kBlockSize), record);
+    };
+    // Follows the cycles of the permutation, so that only one gaussian needs a second home.
+    constexpr uint32_t kDone = std::numeric_limits<uint32_t>::max();
+    for (size_t start = 0; start < order.size(); ++start) {
+      if (order[start].second == kDone) continue;
+      const Record first = take_nth(start);
+      size_t to = start;
+      while (true) {
+        const size_t from = std::exchange(order[to].second, kDone);
+        if (from == start) break;
+        put_nth(to, take_nth(from));
+        to = from;
+      }
+      put_nth(to, first);
+    }
     for (uint32_t b : own) update_bounds(b);
   }
 }

@@ -16,78 +16,57 @@
 HWY_BEFORE_NAMESPACE();
 namespace photoslam::splatting::HWY_NAMESPACE {
 
-/// Column and row of each pixel of a cell, in the order of the lanes.
-alignas(64) inline constexpr float kCellX[kCellPixels] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
-alignas(64) inline constexpr float kCellY[kCellPixels] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
+/// Pixel coordinates of the cells of a tile in the order of the lanes: x by the cell's column, y by its row.
+struct CellCoordinates {
+  alignas(64) float x[kCellsPerRow][kCellPixels];
+  alignas(64) float y[kCellsPerRow][kCellPixels];
+};
+inline constexpr CellCoordinates kCells = [] {
+  CellCoordinates c{};
+  for (int cell = 0; cell < kCellsPerRow; ++cell)
+    for (int i = 0; i < kCellPixels; ++i) {
+      c.x[cell][i] = static_cast<float>(cell * kCellSize + i % kCellSize);
+      c.y[cell][i] = static_cast<float>(cell * kCellSize + i / kCellSize);
+    }
+  return c;
+}();
 inline constexpr size_t kVectorsPerCell = kCellPixels / kLanes;
 
 /// Entries blended between two looks at which cells are finished; their splats are copied to where they stay in L1.
 inline constexpr size_t kBatchSize = 64;
 
-/// A splat as a tile sees it.
-struct alignas(64) LocalSplat {
-  Splat splat;
-  float cell_u[kCellsPerRow];  ///< Position relative to the corners of the tile's cell columns …
-  float cell_v[kCellsPerRow];  ///< … and rows.
-};
-
-/// Copies entries [begin, begin + count) of a tile, and fetches the batch after them into the caches.
+/// Copies entries [begin, begin + count) of a tile with positions relative to the tile, and fetches the batch after
+/// them into the caches.
 HWY_INLINE void gather_batch(const Frame& frame, uint32_t begin, size_t count, uint32_t end, int x0, int y0,
-                             LocalSplat* batch) {
-  alignas(32) static constexpr float kCorner[kCellsPerRow] = {0, 4, 8, 12, 16, 20, 24, 28};
-  const hn::CappedTag<float, kCellsPerRow> d;
+                             Splat* batch) {
+  const float left = static_cast<float>(x0), top = static_cast<float>(y0);
   for (size_t i = 0; i < count; ++i) {
     const uint32_t ahead = begin + static_cast<uint32_t>(i + kBatchSize);
     if (ahead < end) __builtin_prefetch(&frame.splats[frame.entries[ahead].slot]);
-    LocalSplat& local = batch[i];
-    local.splat = frame.splats[frame.entries[begin + i].slot];
-    const auto u = hn::Set(d, local.splat.u - static_cast<float>(x0));
-    const auto v = hn::Set(d, local.splat.v - static_cast<float>(y0));
-    for (size_t k = 0; k < kCellsPerRow; k += hn::Lanes(d)) {
-      hn::Store(hn::Sub(u, hn::Load(d, kCorner + k)), d, local.cell_u + k);
-      hn::Store(hn::Sub(v, hn::Load(d, kCorner + k)), d, local.cell_v + k);
-    }
+    batch[i] = frame.splats[frame.entries[begin + i].slot];
+    batch[i].u -= left;
+    batch[i].v -= top;
   }
 }
 
-/// A splat's parameters in every lane.
-struct SplatLanes {
-  Vec slope, ka, kc, log2_opacity;
-  HWY_INLINE explicit SplatLanes(const Splat& s)
-      : slope(hn::Set(kFloats, s.slope)),
-        ka(hn::Set(kFloats, s.ka)),
-        kc(hn::Set(kFloats, s.kc)),
-        log2_opacity(hn::Set(kFloats, s.log2_opacity)) {}
-};
-
-/// One splat on the pixels of one vector.
-struct Coverage {
-  Vec t, dy;
-  Vec log2_alpha;
-};
-
-/// Part `part` of cell (column, row).
-HWY_INLINE Coverage cover(const LocalSplat& local, const SplatLanes& s, size_t column, size_t row, size_t part) {
-  Coverage c;
-  const Vec dx = hn::Sub(hn::Load(kFloats, kCellX + part * kLanes), hn::Set(kFloats, local.cell_u[column]));
-  c.dy = hn::Sub(hn::Load(kFloats, kCellY + part * kLanes), hn::Set(kFloats, local.cell_v[row]));
-  c.t = hn::NegMulAdd(s.slope, c.dy, dx);
-  const Vec inner = hn::MulAdd(hn::Mul(c.dy, c.dy), s.kc, s.log2_opacity);
-  c.log2_alpha = hn::MulAdd(hn::Mul(c.t, c.t), s.ka, inner);
-  return c;
+/// Pixel coordinates of part `part` of a cell, relative to the tile.
+HWY_INLINE Vec cell_x(size_t cell, size_t part) {
+  return hn::Load(kFloats, kCells.x[cell % kCellsPerRow] + part * kLanes);
+}
+HWY_INLINE Vec cell_y(size_t cell, size_t part) {
+  return hn::Load(kFloats, kCells.y[cell / kCellsPerRow] + part * kLanes);
 }
 
 /// For each splat of a batch, the cells that hold a pixel centre inside its cut ellipse, as bits 8 row + column; up to
 /// a sliver more, never less. One splat per lane.
-HWY_INLINE void touched_cells(const LocalSplat* batch, size_t count, uint64_t* masks) {
+HWY_INLINE void touched_cells(const Splat* batch, size_t count, uint64_t* masks) {
   using Bits = hn::RebindToUnsigned<Floats>;
   constexpr Bits bits;
   enum Field { kU, kV, kSlope, kKc, kCut, kInvKa, kPeak, kExtent, kFields };
   alignas(64) float fields[kFields][kBatchSize];
   for (size_t i = 0; i < count; ++i) {
-    const Splat& s = batch[i].splat;
-    const float values[kFields] = {batch[i].cell_u[0], batch[i].cell_v[0], s.slope,   s.kc, s.cut,
-                                   s.inv_ka,           s.peak_dy,          s.extent_y};
+    const Splat& s = batch[i];
+    const float values[kFields] = {s.u, s.v, s.slope, s.kc, s.cut, s.inv_ka, s.peak_dy, s.extent_y};
     for (int k = 0; k < kFields; ++k) fields[k][i] = values[k];
   }
   // Adding this rounds to an integer and leaves it in the low mantissa bits.
@@ -129,10 +108,49 @@ HWY_INLINE void touched_cells(const LocalSplat* batch, size_t count, uint64_t* m
   }
 }
 
-/// Calls f(cell) for every set bit, lowest first.
-template <class F>
-HWY_INLINE void for_each_cell(uint64_t mask, F&& f) {
-  for (; mask != 0; mask &= mask - 1) f(hwy::Num0BitsBelowLS1Bit_Nonzero64(mask));
+/// Vectors evaluated in lockstep.
+inline constexpr size_t kGroupVectors = 4;
+
+/// Where pixels (x, y) of a tile lie relative to a splat: t and dy of Splat.
+HWY_INLINE void locate(const Splat& s, Vec x, Vec y, Vec& t, Vec& dy) {
+  const Vec dx = hn::Sub(x, hn::Set(kFloats, s.u));
+  dy = hn::Sub(y, hn::Set(kFloats, s.v));
+  t = hn::NegMulAdd(hn::Set(kFloats, s.slope), dy, dx);
+}
+
+struct GroupMasks {
+  Mask masks[kGroupVectors];
+};
+
+/// Unclamped alpha from t and dy for four vectors in lockstep, zero below the cut-off; returns where it is not.
+HWY_INLINE GroupMasks alpha_group(const Splat* const* splats, const Vec* t, const Vec* dy,
+                                  Vec (&alpha)[kGroupVectors]) {
+  Vec log2_alpha[kGroupVectors];
+  for (size_t k = 0; k < kGroupVectors; ++k) {
+    const Splat& s = *splats[k];
+    const Vec inner = hn::MulAdd(hn::Mul(dy[k], dy[k]), hn::Set(kFloats, s.kc), hn::Set(kFloats, s.log2_opacity));
+    log2_alpha[k] = hn::MulAdd(hn::Mul(t[k], t[k]), hn::Set(kFloats, s.ka), inner);
+    alpha[k] = log2_alpha[k];
+  }
+  exp2_fast(alpha);
+  GroupMasks hits;
+  for (size_t k = 0; k < kGroupVectors; ++k) {
+    hits.masks[k] = hn::Ge(log2_alpha[k], hn::Set(kFloats, -kLog2Cut));
+    alpha[k] = hn::IfThenElseZero(hits.masks[k], alpha[k]);
+  }
+  return hits;
+}
+
+/// Transposes a 64x64 matrix of bits: bit c of word r becomes bit r of word c.
+HWY_INLINE void transpose_bits(uint64_t* words) {
+  uint64_t low = 0x00000000FFFFFFFFull;
+  for (size_t half = 32; half != 0; half /= 2, low ^= low << half)
+    for (size_t base = 0; base < 64; base += 2 * half)
+      for (size_t i = base; i < base + half; ++i) {
+        const uint64_t swap = ((words[i] >> half) ^ words[i + half]) & low;
+        words[i] ^= swap << half;
+        words[i + half] ^= swap;
+      }
 }
 
 }  // namespace photoslam::splatting::HWY_NAMESPACE

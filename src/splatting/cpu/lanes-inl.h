@@ -64,19 +64,21 @@ HWY_INLINE Lanes logarithm2(Lanes a) { return hn::Log2(kFloats, a.v); }
 HWY_INLINE Lanes load(const float* p) { return hn::Load(kFloats, p); }
 HWY_INLINE void store(Lanes a, float* p) { hn::Store(a.v, kFloats, p); }
 
-/// 2^x for |x| < 126, relative error below 2e-7 (degree-5 minimax on [−1/2, 1/2]).
-HWY_INLINE Vec exp2_fast(Vec x) {
+/// x ← 2^x for |x| < 126, relative error below 2e-7 (degree-5 minimax on [−1/2, 1/2]).
+/// N vectors in lockstep: one alone would mostly wait for its own chain of dependent operations.
+template <size_t N>
+HWY_INLINE void exp2_fast(Vec (&x)[N]) {
+  constexpr float kCoefficients[5] = {9.67554096e-3f, 5.55071309e-2f, 2.40221202e-1f, 6.93146944e-1f, 1.0f};
   const Vec magic = hn::Set(kFloats, 12582912.0f);  // 1.5 * 2^23: the sum's low mantissa bits are round(x)
-  const Vec shifted = hn::Add(x, magic);
-  const Vec f = hn::Sub(x, hn::Sub(shifted, magic));
-  Vec p = hn::Set(kFloats, 1.32764725e-3f);
-  p = hn::MulAdd(p, f, hn::Set(kFloats, 9.67554096e-3f));
-  p = hn::MulAdd(p, f, hn::Set(kFloats, 5.55071309e-2f));
-  p = hn::MulAdd(p, f, hn::Set(kFloats, 2.40221202e-1f));
-  p = hn::MulAdd(p, f, hn::Set(kFloats, 6.93146944e-1f));
-  p = hn::MulAdd(p, f, hn::Set(kFloats, 1.0f));
   constexpr Ints ints;
-  return hn::BitCast(kFloats, hn::Add(hn::BitCast(ints, p), hn::ShiftLeft<23>(hn::BitCast(ints, shifted))));
+  Vec shifted[N], p[N];
+  for (size_t k = 0; k < N; ++k) shifted[k] = hn::Add(x[k], magic);
+  for (size_t k = 0; k < N; ++k) x[k] = hn::Sub(x[k], hn::Sub(shifted[k], magic));
+  for (size_t k = 0; k < N; ++k) p[k] = hn::Set(kFloats, 1.32764725e-3f);
+  for (const float c : kCoefficients)
+    for (size_t k = 0; k < N; ++k) p[k] = hn::MulAdd(p[k], x[k], hn::Set(kFloats, c));
+  for (size_t k = 0; k < N; ++k)
+    x[k] = hn::BitCast(kFloats, hn::Add(hn::BitCast(ints, p[k]), hn::ShiftLeft<23>(hn::BitCast(ints, shifted[k]))));
 }
 
 /// 1/x to nearly full precision (estimate and Newton steps: cheaper than a division).

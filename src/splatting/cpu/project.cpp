@@ -154,9 +154,14 @@ bool block_in_view(const Block& block, const AnchorView& view, const Frame& fram
 /// Calls emit(tile) for the tiles with a pixel inside the splat's cut ellipse, row by row.
 template <class Emit>
 void for_each_tile(const Splat& s, const Frame& frame, Emit&& emit) {
-  const auto first = [](float from) { return static_cast<int>(std::ceil(std::max(from, 0.0f))); };
+  // Ceiling and floor of values clamped to the image first: conversion truncates, and the library calls are slow.
+  const auto first = [](float from) {
+    const float clamped = std::clamp(from, 0.0f, 1e6f);
+    const int truncated = static_cast<int>(clamped);
+    return truncated + (clamped > static_cast<float>(truncated) ? 1 : 0);
+  };
   const auto last = [](float to, int size) {
-    return static_cast<int>(std::min(std::floor(to), static_cast<float>(size - 1)));
+    return static_cast<int>(std::clamp(to, -1.0f, static_cast<float>(size - 1)) + 1.0f) - 1;
   };
   const int x0 = first(s.u - s.extent_x), x1 = last(s.u + s.extent_x, frame.width);
   const int y0 = first(s.v - s.extent_y), y1 = last(s.v + s.extent_y, frame.height);
@@ -181,6 +186,7 @@ void for_each_tile(const Splat& s, const Frame& frame, Emit&& emit) {
 
 void project_rank(const GaussianModel& model, Frame& frame, size_t rank, std::vector<uint32_t>& tiles) {
   const Block& block = model.block(frame.blocks[rank]);
+  if (rank + 1 < frame.blocks.size()) prefetch_parameters(model.block(frame.blocks[rank + 1]), frame.sh_degree);
   const AnchorView& view = frame.anchors[static_cast<size_t>(block.anchor)];
   Splat* splats = &frame.splats[rank * kBlockSize];
   const uint64_t candidates =

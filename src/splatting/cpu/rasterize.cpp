@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "splatting/cpu/targets.h"
 
@@ -17,63 +18,105 @@
 HWY_BEFORE_NAMESPACE();
 namespace photoslam::splatting::HWY_NAMESPACE {
 
-/// State of a tile's pixels, cell after cell. A finished pixel (the next splat would bring its transmittance to 1e-4
-/// or below) keeps its transmittance with the sign changed.
-struct TileState {
-  alignas(64) float transmittance[kTilePixels];
-  alignas(64) float rgb[3][kTilePixels];
-  alignas(64) float depth[kTilePixels];
+/// State of a cell's pixels. `running` is the product of all 1 − alpha so far; blending stops before it reaches 1e-4,
+/// and since it only falls, comparing it is enough to know. `transmittance` is what was left when blending stopped.
+struct alignas(64) CellState {
+  float running[kCellPixels];
+  float transmittance[kCellPixels];
+  float rgb[3][kCellPixels];
+  float depth[kCellPixels];
 };
 
+using TileState = CellState[64];
+
 void begin_tile(int columns, int rows, TileState& state) {
-  std::fill_n(state.rgb[0], 3 * kTilePixels, 0.0f);
-  std::fill_n(state.depth, kTilePixels, 0.0f);
-  std::fill_n(state.transmittance, kTilePixels, 1.0f);
-  if (columns == kTileSize && rows == kTileSize) return;
-  for (int at = 0; at < kTilePixels; ++at) {
-    const int cell = at / kCellPixels, i = at % kCellPixels;
-    const int x = (cell % kCellsPerRow) * kCellSize + i % kCellSize;
-    const int y = (cell / kCellsPerRow) * kCellSize + i / kCellSize;
-    if (x >= columns || y >= rows) state.transmittance[at] = -1.0f;
+  for (int cell = 0; cell < 64; ++cell) {
+    state[cell] = CellState{};
+    const int x = (cell % kCellsPerRow) * kCellSize, y = (cell / kCellsPerRow) * kCellSize;
+    for (int i = 0; i < kCellPixels; ++i) {
+      state[cell].running[i] = x + i % kCellSize < columns && y + i / kCellSize < rows ? 1.0f : 0.0f;
+      state[cell].transmittance[i] = 1.0f;
+    }
   }
 }
 
-/// Cells with an unfinished pixel.
+/// Can the next splats still change a pixel of this cell?
+HWY_INLINE bool is_active(const CellState& cell) {
+  Vec best = hn::Load(kFloats, cell.running);
+  for (size_t part = 1; part < kVectorsPerCell; ++part)
+    best = hn::Max(best, hn::Load(kFloats, cell.running + part * kLanes));
+  return !hn::AllFalse(kFloats, hn::Gt(best, hn::Set(kFloats, kMinTransmittance)));
+}
+
 uint64_t active_cells(const TileState& state) {
   uint64_t active = 0;
-  for (size_t cell = 0; cell < 64; ++cell) {
-    Vec best = hn::Load(kFloats, state.transmittance + cell * kCellPixels);
-    for (size_t part = 1; part < kVectorsPerCell; ++part)
-      best = hn::Max(best, hn::Load(kFloats, state.transmittance + cell * kCellPixels + part * kLanes));
-    const uint64_t any = hn::AllFalse(kFloats, hn::Gt(best, hn::Zero(kFloats))) ? 0 : 1;
-    active |= any << cell;
-  }
+  for (size_t cell = 0; cell < 64; ++cell) active |= static_cast<uint64_t>(is_active(state[cell])) << cell;
   return active;
 }
 
-/// Blends one splat into one cell, without branches; returns whether it covers any of its pixels.
-HWY_INLINE bool blend_cell(const LocalSplat& local, const SplatLanes& lanes, size_t cell, TileState& state) {
-  bool covers = false;
+/// Blends the splats of a batch whose bits are set into a cell. A group is filled up with batch[kBatchSize], which is
+/// invisible. Returns the bits of those that cover one of its pixels.
+HWY_INLINE uint64_t blend_cell(const Splat* batch, uint64_t entries, size_t cell, CellState& c) {
+  uint8_t list[kBatchSize + kGroupVectors];
+  size_t count = 0;
+  for (; entries != 0; entries &= entries - 1)
+    list[count++] = static_cast<uint8_t>(hwy::Num0BitsBelowLS1Bit_Nonzero64(entries));
+  std::fill_n(list + count, kGroupVectors, static_cast<uint8_t>(kBatchSize));
+  uint64_t covering = 0;
   for (size_t part = 0; part < kVectorsPerCell; ++part) {
-    const size_t at = cell * kCellPixels + part * kLanes;
-    const Coverage c = cover(local, lanes, cell % kCellsPerRow, cell / kCellsPerRow, part);
-    const Mask hit = hn::Ge(c.log2_alpha, hn::Set(kFloats, -kLog2Cut));
-    covers |= !hn::AllFalse(kFloats, hit);
-    const Vec alpha = hn::IfThenElseZero(hit, hn::Min(exp2_fast(c.log2_alpha), hn::Set(kFloats, kMaxAlpha)));
-    const Vec before = hn::Load(kFloats, state.transmittance + at);
-    const Vec after = hn::NegMulAdd(alpha, before, before);
-    const Mask blend = hn::Gt(after, hn::Set(kFloats, kMinTransmittance));  // false where finished before
-    const Vec weight = hn::IfThenElseZero(blend, hn::Mul(alpha, before));
-    for (int k = 0; k < 3; ++k) {
-      float* sum = state.rgb[k] + at;
-      hn::Store(hn::MulAdd(weight, hn::Set(kFloats, local.splat.rgb[k]), hn::Load(kFloats, sum)), kFloats, sum);
+    const size_t at = part * kLanes;
+    const Vec x = cell_x(cell, part), y = cell_y(cell, part);
+    Vec running = hn::Load(kFloats, c.running + at), left = hn::Load(kFloats, c.transmittance + at);
+    Vec red = hn::Load(kFloats, c.rgb[0] + at), green = hn::Load(kFloats, c.rgb[1] + at);
+    Vec blue = hn::Load(kFloats, c.rgb[2] + at), depth = hn::Load(kFloats, c.depth + at);
+    for (size_t i = 0; i < count; i += kGroupVectors) {
+      const Splat* splats[kGroupVectors];
+      Vec t[kGroupVectors], dy[kGroupVectors], alpha[kGroupVectors];
+      for (size_t k = 0; k < kGroupVectors; ++k) splats[k] = batch + list[i + k];
+      for (size_t k = 0; k < kGroupVectors; ++k) locate(*splats[k], x, y, t[k], dy[k]);
+      const GroupMasks hits = alpha_group(splats, t, dy, alpha);
+      for (size_t k = 0; k < kGroupVectors; ++k) {
+        covering |= static_cast<uint64_t>(!hn::AllFalse(kFloats, hits.masks[k])) << (list[i + k] % 64);
+        const Vec clamped = hn::Min(alpha[k], hn::Set(kFloats, kMaxAlpha));
+        const Vec after = hn::NegMulAdd(clamped, running, running);
+        const Mask blends = hn::Gt(after, hn::Set(kFloats, kMinTransmittance));
+        const Vec weight = hn::IfThenElseZero(blends, hn::Mul(clamped, running));
+        red = hn::MulAdd(weight, hn::Set(kFloats, splats[k]->rgb[0]), red);
+        green = hn::MulAdd(weight, hn::Set(kFloats, splats[k]->rgb[1]), green);
+        blue = hn::MulAdd(weight, hn::Set(kFloats, splats[k]->rgb[2]), blue);
+        depth = hn::MulAdd(weight, hn::Set(kFloats, splats[k]->z), depth);
+        left = hn::IfThenElse(blends, after, left);
+        running = after;
+      }
     }
-    float* depth = state.depth + at;
-    hn::Store(hn::MulAdd(weight, hn::Set(kFloats, local.splat.z), hn::Load(kFloats, depth)), kFloats, depth);
-    const Vec finished = hn::Or(before, hn::Set(kFloats, -0.0f));
-    hn::Store(hn::IfThenElse(blend, after, finished), kFloats, state.transmittance + at);
+    hn::Store(running, kFloats, c.running + at);
+    hn::Store(left, kFloats, c.transmittance + at);
+    hn::Store(red, kFloats, c.rgb[0] + at);
+    hn::Store(green, kFloats, c.rgb[1] + at);
+    hn::Store(blue, kFloats, c.rgb[2] + at);
+    hn::Store(depth, kFloats, c.depth + at);
   }
-  return covers;
+  return covering;
+}
+
+/// Copies `count` <= 4 pixels of row `row` of a cell into the image planes.
+HWY_INLINE void write_pixels(const CellState& cell, int row, int count, const float* background, size_t plane,
+                             size_t pixel, RenderResult& result) {
+  const int from = row * kCellSize;
+  float transmittance[kCellSize], values[5][kCellSize];
+  for (int i = 0; i < kCellSize; ++i) transmittance[i] = cell.transmittance[from + i];
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; i < kCellSize; ++i) values[k][i] = cell.rgb[k][from + i] + transmittance[i] * background[k];
+  for (int i = 0; i < kCellSize; ++i) values[3][i] = cell.depth[from + i];
+  for (int i = 0; i < kCellSize; ++i) values[4][i] = 1.0f - transmittance[i];
+  float* const outputs[5] = {&result.rgb[pixel], &result.rgb[plane + pixel], &result.rgb[2 * plane + pixel],
+                             &result.depth[pixel], &result.alpha[pixel]};
+  for (int k = 0; k < 5; ++k) {
+    if (count == kCellSize)
+      std::memcpy(outputs[k], values[k], sizeof(values[k]));
+    else
+      std::copy_n(values[k], count, outputs[k]);
+  }
 }
 
 void end_tile(const Frame& frame, int x0, int y0, const TileState& state, RenderResult& result) {
@@ -81,20 +124,9 @@ void end_tile(const Frame& frame, int x0, int y0, const TileState& state, Render
   const size_t plane = static_cast<size_t>(frame.width) * static_cast<size_t>(frame.height);
   for (int y = 0; y < rows; ++y) {
     const size_t out = static_cast<size_t>(y0 + y) * static_cast<size_t>(frame.width) + static_cast<size_t>(x0);
-    for (int x = 0; x < columns; x += kCellSize) {
-      const int cell = (y / kCellSize) * kCellsPerRow + x / kCellSize;
-      const int at = cell * kCellPixels + (y % kCellSize) * kCellSize;
-      const size_t pixel = out + static_cast<size_t>(x);
-      const int count = std::min(kCellSize, columns - x);
-      for (int i = 0; i < count; ++i) {
-        const float transmittance = std::abs(state.transmittance[at + i]);
-        const size_t p = pixel + static_cast<size_t>(i);
-        for (size_t k = 0; k < 3; ++k)
-          result.rgb[k * plane + p] = state.rgb[k][at + i] + transmittance * frame.background[k];
-        result.depth[p] = state.depth[at + i];
-        result.alpha[p] = 1.0f - transmittance;
-      }
-    }
+    for (int x = 0; x < columns; x += kCellSize)
+      write_pixels(state[(y / kCellSize) * kCellsPerRow + x / kCellSize], y % kCellSize,
+                   std::min(kCellSize, columns - x), frame.background, plane, out + static_cast<size_t>(x), result);
   }
 }
 
@@ -104,22 +136,23 @@ void rasterize_tile(Frame& frame, int tile, RenderResult& result) {
   begin_tile(std::min(kTileSize, frame.width - x0), std::min(kTileSize, frame.height - y0), state);
   const uint32_t end = frame.tile_begin[static_cast<size_t>(tile) + 1];
   uint32_t begin = frame.tile_begin[static_cast<size_t>(tile)];
-  alignas(64) LocalSplat batch[kBatchSize];
-  uint64_t masks[kBatchSize + 16];
+  Splat batch[kBatchSize + 1];
+  batch[kBatchSize] = Splat{};
+  batch[kBatchSize].log2_opacity = -100.0f;
   while (begin < end) {
     const uint64_t active = active_cells(state);
     if (active == 0) break;
     const size_t count = std::min<size_t>(kBatchSize, end - begin);
     gather_batch(frame, begin, count, end, x0, y0, batch);
+    alignas(64) uint64_t masks[64] = {};
     touched_cells(batch, count, masks);
-    for (size_t i = 0; i < count; ++i) {
-      const SplatLanes lanes(batch[i].splat);
-      uint64_t used = 0;
-      for_each_cell(masks[i] & active, [&](size_t cell) HWY_ATTR {
-        used |= static_cast<uint64_t>(blend_cell(batch[i], lanes, cell, state)) << cell;
-      });
-      frame.cell_masks[begin + i] = used;
-    }
+    std::fill(masks + count, masks + 64, 0);
+    transpose_bits(masks);  // cells of an entry → entries of a cell
+    for (size_t cell = 0; cell < 64; ++cell)
+      masks[cell] =
+          ((active >> cell) & 1) != 0 && masks[cell] != 0 ? blend_cell(batch, masks[cell], cell, state[cell]) : 0;
+    transpose_bits(masks);
+    std::copy_n(masks, count, frame.cell_masks.data() + begin);
     begin += static_cast<uint32_t>(count);
   }
   std::fill(frame.cell_masks.data() + begin, frame.cell_masks.data() + end, 0);

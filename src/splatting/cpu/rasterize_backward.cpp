@@ -16,51 +16,43 @@
 HWY_BEFORE_NAMESPACE();
 namespace photoslam::splatting::HWY_NAMESPACE {
 
-/// Gradient records to fetch ahead of writing them.
-inline constexpr uint32_t kRecordsAhead = 12;
-
-/// What a tile's pixels carry along, cell after cell. `behind` is Σ over the splats still to come of weight times
-/// (gradient · value), the background included: with it one number per pixel replaces the colours behind.
-struct TileGradientState {
-  alignas(64) float transmittance[kTilePixels];  ///< Sign as in the forward pass.
-  alignas(64) float behind[kTilePixels];
-  alignas(64) float rgb[3][kTilePixels];  ///< dL/d(colour of the pixel)
-  alignas(64) float depth[kTilePixels];   ///< dL/d(depth of the pixel)
+/// What a cell's pixels carry along. `behind` is Σ over the splats still to come of weight times (gradient · value),
+/// the background included: with it one number per pixel replaces the colours behind.
+struct alignas(64) CellGradientState {
+  float running[kCellPixels];  ///< Product of all 1 − alpha so far, as in the forward pass.
+  float behind[kCellPixels];
+  float rgb[3][kCellPixels];  ///< dL/d(colour of the pixel)
+  float depth[kCellPixels];   ///< dL/d(depth of the pixel)
 };
+
+/// One cell more than the tile has: what is blended there does not count.
+using TileGradientState = CellGradientState[65];
+
+HWY_INLINE void read_pixel(const RenderResult& image, const ImageGradient& gradient, size_t plane, size_t pixel, int at,
+                           CellGradientState& cell) {
+  float behind = 0;
+  for (size_t k = 0; k < 3; ++k) {
+    const float g = gradient.rgb[k * plane + pixel];
+    cell.rgb[k][at] = g;
+    behind += g * image.rgb[k * plane + pixel];
+  }
+  cell.depth[at] = gradient.depth.empty() ? 0.0f : gradient.depth[pixel];
+  behind += cell.depth[at] * image.depth[pixel];
+  if (!gradient.alpha.empty()) behind -= gradient.alpha[pixel] * (1.0f - image.alpha[pixel]);
+  cell.behind[at] = behind;
+  cell.running[at] = 1.0f;
+}
 
 void begin_gradient_tile(const Frame& frame, int x0, int y0, const RenderResult& image, const ImageGradient& gradient,
                          TileGradientState& state) {
   const int columns = std::min(kTileSize, frame.width - x0), rows = std::min(kTileSize, frame.height - y0);
   const size_t plane = static_cast<size_t>(frame.width) * static_cast<size_t>(frame.height);
-  if (columns < kTileSize || rows < kTileSize) {
-    std::fill_n(state.transmittance, kTilePixels, -1.0f);
-    std::fill_n(state.behind, kTilePixels, 0.0f);
-    std::fill_n(state.rgb[0], 3 * kTilePixels, 0.0f);
-    std::fill_n(state.depth, kTilePixels, 0.0f);
-  }
+  for (CellGradientState& cell : state) cell = CellGradientState{};
   for (int y = 0; y < rows; ++y) {
     const size_t in = static_cast<size_t>(y0 + y) * static_cast<size_t>(frame.width) + static_cast<size_t>(x0);
-    for (int x = 0; x < columns; x += kCellSize) {
-      const int cell = (y / kCellSize) * kCellsPerRow + x / kCellSize;
-      const int first = cell * kCellPixels + (y % kCellSize) * kCellSize;
-      const int count = std::min(kCellSize, columns - x);
-      for (int i = 0; i < count; ++i) {
-        const int at = first + i;
-        const size_t pixel = in + static_cast<size_t>(x + i);
-        float behind = 0;
-        for (size_t k = 0; k < 3; ++k) {
-          const float g = gradient.rgb[k * plane + pixel];
-          state.rgb[k][at] = g;
-          behind += g * image.rgb[k * plane + pixel];
-        }
-        const float depth = gradient.depth.empty() ? 0.0f : gradient.depth[pixel];
-        behind += depth * image.depth[pixel];
-        if (!gradient.alpha.empty()) behind -= gradient.alpha[pixel] * (1.0f - image.alpha[pixel]);
-        state.depth[at] = depth;
-        state.behind[at] = behind;
-        state.transmittance[at] = 1.0f;
-      }
-    }
+    for (int x = 0; x < columns; ++x)
+      read_pixel(image, gradient, plane, in + static_cast<size_t>(x), y % kCellSize * kCellSize + x % kCellSize,
+                 state[y / kCellSize * kCellsPerRow + x / kCellSize]);
   }
 }
 
@@ -108,70 +100,129 @@ struct RecordLanes {
   }
 };
 
-template <bool kDepth>
-HWY_INLINE void unblend_cell(const LocalSplat& local, const SplatLanes& lanes, size_t cell, TileGradientState& state,
-                             RecordLanes& sums) {
-  const Splat& splat = local.splat;
-  const Vec one = hn::Set(kFloats, 1.0f), max_alpha = hn::Set(kFloats, kMaxAlpha);
-  for (size_t part = 0; part < kVectorsPerCell; ++part) {
-    const size_t at = cell * kCellPixels + part * kLanes;
-    const Coverage c = cover(local, lanes, cell % kCellsPerRow, cell / kCellsPerRow, part);
-    const Mask hit = hn::Ge(c.log2_alpha, hn::Set(kFloats, -kLog2Cut));
-    const Vec raw = hn::IfThenElseZero(hit, exp2_fast(c.log2_alpha));
-    const Vec alpha = hn::Min(raw, max_alpha);
-    const Vec before = hn::Load(kFloats, state.transmittance + at);
-    const Vec after = hn::NegMulAdd(alpha, before, before);
-    const Mask blend = hn::Gt(after, hn::Set(kFloats, kMinTransmittance));
-    const Vec weight = hn::IfThenElseZero(blend, hn::Mul(alpha, before));
-    const Vec gr = hn::Load(kFloats, state.rgb[0] + at), gg = hn::Load(kFloats, state.rgb[1] + at);
-    const Vec gb = hn::Load(kFloats, state.rgb[2] + at);
-    Vec value = hn::Mul(gr, hn::Set(kFloats, splat.rgb[0]));
-    value = hn::MulAdd(gg, hn::Set(kFloats, splat.rgb[1]), value);
-    value = hn::MulAdd(gb, hn::Set(kFloats, splat.rgb[2]), value);
-    if constexpr (kDepth) {
-      const Vec gz = hn::Load(kFloats, state.depth + at);
-      value = hn::MulAdd(gz, hn::Set(kFloats, splat.z), value);
-      sums.z = hn::MulAdd(weight, gz, sums.z);
+inline constexpr size_t kMaxPairs = 128;
+inline constexpr size_t kGroupCells = kGroupVectors / kVectorsPerCell;
+static_assert(kGroupCells >= 1);
+
+/// (splat, cell) pairs in blending order, and what can be known of them before blending.
+struct Pairs {
+  size_t count = 0;
+  uint8_t entries[kMaxPairs + kGroupCells];  ///< Index into the batch.
+  uint8_t cells[kMaxPairs + kGroupCells];
+  alignas(64) float alpha[(kMaxPairs + kGroupCells) * kCellPixels];  ///< Clamped.
+  alignas(64) float odds[(kMaxPairs + kGroupCells) * kCellPixels];   ///< alpha / (1 − alpha); −1 where clamped.
+
+  HWY_INLINE bool has_room() const { return count + 64 <= kMaxPairs; }
+  HWY_INLINE void append(size_t entry, uint64_t mask) {
+    for (; mask != 0; mask &= mask - 1) {
+      entries[count] = static_cast<uint8_t>(entry);
+      cells[count++] = static_cast<uint8_t>(hwy::Num0BitsBelowLS1Bit_Nonzero64(mask));
     }
-    const Vec behind = hn::NegMulAdd(weight, value, hn::Load(kFloats, state.behind + at));
-    hn::Store(behind, kFloats, state.behind + at);
-    // dL/d(ln alpha) = weight value − behind alpha / (1 − alpha), with alpha > 0 and unclamped only.
-    const Vec odds = hn::Mul(alpha, reciprocal(hn::Sub(one, alpha)));
-    const Mask moves = hn::And(blend, hn::Le(raw, max_alpha));
-    const Vec h = hn::IfThenElseZero(moves, hn::NegMulAdd(behind, odds, hn::Mul(weight, value)));
-    const Vec h_t = hn::Mul(h, c.t), h_dy = hn::Mul(h, c.dy);
-    sums.t = hn::Add(sums.t, h_t);
-    sums.dy = hn::Add(sums.dy, h_dy);
-    sums.tt = hn::MulAdd(h_t, c.t, sums.tt);
-    sums.t_dy = hn::MulAdd(h_t, c.dy, sums.t_dy);
-    sums.dy_dy = hn::MulAdd(h_dy, c.dy, sums.dy_dy);
-    sums.one = hn::Add(sums.one, h);
-    sums.r = hn::MulAdd(weight, gr, sums.r);
-    sums.g = hn::MulAdd(weight, gg, sums.g);
-    sums.b = hn::MulAdd(weight, gb, sums.b);
-    sums.weight = hn::Add(sums.weight, weight);
-    sums.max_weight = hn::Max(sums.max_weight, weight);
-    const Vec finished = hn::Or(before, hn::Set(kFloats, -0.0f));
-    hn::Store(hn::IfThenElse(blend, after, finished), kFloats, state.transmittance + at);
+  }
+};
+
+/// Fills in alpha and odds of all pairs, in lockstep groups.
+HWY_INLINE void cover_pairs(const Splat* batch, Pairs& pairs) {
+  std::fill_n(pairs.entries + pairs.count, kGroupCells, uint8_t{0});
+  std::fill_n(pairs.cells + pairs.count, kGroupCells, uint8_t{0});
+  const Vec one = hn::Set(kFloats, 1.0f), max_alpha = hn::Set(kFloats, kMaxAlpha), minus_one = hn::Set(kFloats, -1.0f);
+  for (size_t i = 0; i < pairs.count; i += kGroupCells) {
+    const Splat* splats[kGroupVectors];
+    Vec t[kGroupVectors], dy[kGroupVectors], raw[kGroupVectors], alpha[kGroupVectors], odds[kGroupVectors];
+    for (size_t k = 0; k < kGroupVectors; ++k) {
+      const size_t pair = i + k / kVectorsPerCell, part = k % kVectorsPerCell, cell = pairs.cells[pair];
+      splats[k] = &batch[pairs.entries[pair]];
+      locate(*splats[k], cell_x(cell, part), cell_y(cell, part), t[k], dy[k]);
+    }
+    alpha_group(splats, t, dy, raw);
+    for (size_t k = 0; k < kGroupVectors; ++k) alpha[k] = hn::Min(raw[k], max_alpha);
+    for (size_t k = 0; k < kGroupVectors; ++k) odds[k] = hn::Mul(alpha[k], reciprocal(hn::Sub(one, alpha[k])));
+    for (size_t k = 0; k < kGroupVectors; ++k) {
+      const Vec value = hn::IfThenElse(hn::Gt(raw[k], max_alpha), minus_one, odds[k]);
+      hn::Store(alpha[k], kFloats, pairs.alpha + i * kCellPixels + k * kLanes);
+      hn::Store(value, kFloats, pairs.odds + i * kCellPixels + k * kLanes);
+    }
   }
 }
 
 template <bool kDepth>
+HWY_INLINE void unblend(const Splat& splat, uint8_t cell, size_t part, Vec alpha, Vec odds, TileGradientState& tile,
+                        RecordLanes& sums) {
+  CellGradientState& state = tile[cell];
+  const size_t at = part * kLanes;
+  const Vec before = hn::Load(kFloats, state.running + at);
+  const Vec after = hn::NegMulAdd(alpha, before, before);
+  const Mask blends = hn::Gt(after, hn::Set(kFloats, kMinTransmittance));
+  const Vec weight = hn::IfThenElseZero(blends, hn::Mul(alpha, before));
+  const Vec gr = hn::Load(kFloats, state.rgb[0] + at), gg = hn::Load(kFloats, state.rgb[1] + at);
+  const Vec gb = hn::Load(kFloats, state.rgb[2] + at);
+  Vec value = hn::Mul(gr, hn::Set(kFloats, splat.rgb[0]));
+  value = hn::MulAdd(gg, hn::Set(kFloats, splat.rgb[1]), value);
+  value = hn::MulAdd(gb, hn::Set(kFloats, splat.rgb[2]), value);
+  if constexpr (kDepth) {
+    const Vec gz = hn::Load(kFloats, state.depth + at);
+    value = hn::MulAdd(gz, hn::Set(kFloats, splat.z), value);
+    sums.z = hn::MulAdd(weight, gz, sums.z);
+  }
+  const Vec behind = hn::NegMulAdd(weight, value, hn::Load(kFloats, state.behind + at));
+  hn::Store(behind, kFloats, state.behind + at);
+  // h = dL/d(ln alpha) = weight value − behind alpha / (1 − alpha); a clamped alpha does not follow its exponent.
+  const Mask moves = hn::And(blends, hn::Ge(odds, hn::Zero(kFloats)));
+  const Vec h = hn::IfThenElseZero(moves, hn::NegMulAdd(behind, odds, hn::Mul(weight, value)));
+  Vec t, dy;
+  locate(splat, cell_x(cell, part), cell_y(cell, part), t, dy);
+  const Vec h_t = hn::Mul(h, t), h_dy = hn::Mul(h, dy);
+  sums.t = hn::Add(sums.t, h_t);
+  sums.dy = hn::Add(sums.dy, h_dy);
+  sums.tt = hn::MulAdd(h_t, t, sums.tt);
+  sums.t_dy = hn::MulAdd(h_t, dy, sums.t_dy);
+  sums.dy_dy = hn::MulAdd(h_dy, dy, sums.dy_dy);
+  sums.one = hn::Add(sums.one, h);
+  sums.r = hn::MulAdd(weight, gr, sums.r);
+  sums.g = hn::MulAdd(weight, gg, sums.g);
+  sums.b = hn::MulAdd(weight, gb, sums.b);
+  sums.weight = hn::Add(sums.weight, weight);
+  sums.max_weight = hn::Max(sums.max_weight, weight);
+  hn::Store(after, kFloats, state.running + at);
+}
+
+/// Entries [first, last) of a batch, whose pairs are listed: one gradient record each.
+template <bool kDepth>
+HWY_INLINE void unblend_pairs(Frame& frame, const TileEntry* entries, size_t first, size_t last, const Splat* batch,
+                              Pairs& pairs, TileGradientState& state) {
+  cover_pairs(batch, pairs);
+  size_t pair = 0;
+  for (size_t i = first; i < last; ++i) {
+    RecordLanes sums;
+    for (; pair < pairs.count && pairs.entries[pair] == i; ++pair)
+      for (size_t part = 0; part < kVectorsPerCell; ++part) {
+        const size_t at = pair * kCellPixels + part * kLanes;
+        unblend<kDepth>(batch[i], pairs.cells[pair], part, hn::Load(kFloats, pairs.alpha + at),
+                        hn::Load(kFloats, pairs.odds + at), state, sums);
+      }
+    sums.reduce(frame.gradients[entries[i].instance]);
+  }
+  pairs.count = 0;
+}
+
+template <bool kDepth>
 HWY_INLINE void unblend_entries(Frame& frame, uint32_t begin, uint32_t end, int x0, int y0, TileGradientState& state) {
-  alignas(64) LocalSplat batch[kBatchSize];
+  Splat batch[kBatchSize];
+  Pairs pairs;
   while (begin < end) {
     const size_t count = std::min<size_t>(kBatchSize, end - begin);
+    const TileEntry* entries = &frame.entries[begin];
     gather_batch(frame, begin, count, end, x0, y0, batch);
+    size_t first = 0;
     for (size_t i = 0; i < count; ++i) {
-      const uint32_t instance = frame.entries[begin + i].instance;
-      if (begin + i + kRecordsAhead < end)
-        __builtin_prefetch(&frame.gradients[frame.entries[begin + i + kRecordsAhead].instance], 1);
-      const SplatLanes lanes(batch[i].splat);
-      RecordLanes sums;
-      for_each_cell(frame.cell_masks[begin + i],
-                    [&](size_t cell) HWY_ATTR { unblend_cell<kDepth>(batch[i], lanes, cell, state, sums); });
-      sums.reduce(frame.gradients[instance]);
+      __builtin_prefetch(&frame.gradients[entries[i].instance], 1);
+      if (!pairs.has_room()) {
+        unblend_pairs<kDepth>(frame, entries, first, i, batch, pairs, state);
+        first = i;
+      }
+      pairs.append(i, frame.cell_masks[begin + i]);
     }
+    unblend_pairs<kDepth>(frame, entries, first, count, batch, pairs, state);
     begin += static_cast<uint32_t>(count);
   }
 }

@@ -257,6 +257,10 @@ void run_backward(Executor& executor, Frame& frame, const GaussianModel& model, 
     for (int rank = task * kBlocksPerTask; rank < end; ++rank) {
       const size_t r = static_cast<size_t>(rank), b = frame.blocks[r];
       if (frame.visible[r] == 0) continue;
+      if (rank + 1 < frame.num_ranks()) {
+        prefetch_parameters(model.block(frame.blocks[r + 1]), frame.sh_degree);
+        if (target_of(b).model != nullptr) prefetch_moments(model.block(frame.blocks[r + 1]), frame.sh_degree);
+      }
       HWY_DYNAMIC_DISPATCH(backward_block)
       (frame, r, model.block(b), constants, target_of(b), &sums[static_cast<size_t>(task) * 6]);
     }
