@@ -5,6 +5,7 @@
 #include <bit>
 #include <csetjmp>
 #include <cstring>
+#include <new>
 
 #include "io/image_codec.h"
 
@@ -37,11 +38,11 @@ void read_bytes(png_structp png, png_bytep destination, size_t count) {
 
 void write_bytes(png_structp png, png_bytep source, size_t count) {
   auto* state = static_cast<PngState*>(png_get_io_ptr(png));
-  bool stored = false;
+  bool stored = true;
   try {
     state->written.append(reinterpret_cast<const char*>(source), count);
-    stored = true;
-  } catch (...) {  // an exception must not pass through libpng
+  } catch (const std::bad_alloc&) {  // an exception must not pass through libpng
+    stored = false;
   }
   if (!stored) fail(png, "out of memory");
 }
