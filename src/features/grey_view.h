@@ -20,7 +20,9 @@ struct BasicGreyView {
 
   Byte* row(int y) const { return pixels + y * stride; }
   Byte* at(int x, int y) const { return row(y) + x; }
-  operator BasicGreyView<const uint8_t>() const { return {pixels, width, height, stride}; }
+  operator BasicGreyView<const uint8_t>() const {  // NOLINT(google-explicit-constructor): like span<T> to span<const T>
+    return {pixels, width, height, stride};
+  }
 };
 
 using GreyView = BasicGreyView<const uint8_t>;

@@ -152,7 +152,7 @@ void select_consistent_rotations(std::span<const float> rotations, std::vector<u
   constexpr float kTurn = static_cast<float>(2 * std::numbers::pi);
   const auto bin_of = [](float rotation) {
     const float turns = rotation / kTurn;
-    return static_cast<size_t>((turns - std::floor(turns)) * kBins + 0.5f) % kBins;
+    return static_cast<size_t>(std::lround((turns - std::floor(turns)) * kBins)) % kBins;
   };
   std::array<int, kBins> count{};
   for (float rotation : rotations) {

@@ -105,7 +105,7 @@ SE3 pose_from_triangles(const Vec3 world[3], const Vec3 camera[3]) {
 /// directions.
 int intersect(const Mat3& degenerate, const Mat3& cone, Vec3 directions[4]) {
   const Eigen::SelfAdjointEigenSolver<Mat3> eigen(degenerate);
-  const Vec3 values = eigen.eigenvalues();
+  const Vec3& values = eigen.eigenvalues();
   if (!(values[0] < 0 && values[2] > 0)) return 0;  // No real planes.
   const double ratio = std::sqrt(-values[0] / values[2]);
   int count = 0;

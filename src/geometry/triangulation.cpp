@@ -36,7 +36,7 @@ std::optional<Vec3> triangulate(const PinholeCamera& camera, const PointView& a,
   const double distance_a = ray_b.cross(baseline).norm() / sine, distance_b = ray_a.cross(baseline).norm() / sine;
   const Vec3 end_a = world_from_a.translation + distance_a * ray_a;
   const Vec3 end_b = world_from_b.translation + distance_b * ray_b;
-  const Vec3 point = (distance_b * end_a + distance_a * end_b) / (distance_a + distance_b);
+  Vec3 point = (distance_b * end_a + distance_a * end_b) / (distance_a + distance_b);
   if (!point.allFinite()) return std::nullopt;
   // Rays that diverge meet behind the cameras; the unsigned distances then give a point that reprojects nowhere near.
   if (!reprojects(camera, a, point, limits.max_chi2) || !reprojects(camera, b, point, limits.max_chi2)) {
