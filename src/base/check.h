@@ -25,8 +25,8 @@ namespace internal {
 
 /// Throws CheckError with file, line and the formatted values unless the condition holds.
 /// Usage: PHOTOSLAM_CHECK(a.size() == b.size(), "{} landmarks, {} descriptors", a.size(), b.size());
-#define PHOTOSLAM_CHECK(condition, ...)                                                               \
-  do {                                                                                                \
-    if (!(condition)) [[unlikely]]                                                                    \
+#define PHOTOSLAM_CHECK(condition, ...)                                                                 \
+  do {                                                                                                  \
+    if (!(condition)) [[unlikely]]                                                                      \
       ::photoslam::internal::fail_check(__FILE__, __LINE__, #condition, ::fmt::format("" __VA_ARGS__)); \
   } while (false)

@@ -33,8 +33,8 @@ struct PinholeCamera {
 /// becomes pixel i, so x_full = (x_small + ½) factor − ½. Sizes round down.
 inline PinholeCamera shrink(const PinholeCamera& camera, int factor) {
   const double s = factor;
-  return {camera.width / factor,      camera.height / factor, camera.fx / s, camera.fy / s, (camera.cx + 0.5) / s - 0.5,
-          (camera.cy + 0.5) / s - 0.5};
+  return {camera.width / factor, camera.height / factor,      camera.fx / s,
+          camera.fy / s,         (camera.cx + 0.5) / s - 0.5, (camera.cy + 0.5) / s - 0.5};
 }
 
 }  // namespace photoslam

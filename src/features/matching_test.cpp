@@ -79,72 +79,72 @@ TEST(KeypointGrid, EmptyOrOddQueriesFindNothingOrSomethingButDoNotFail) {
 
 class ProjectionMatcherTest : public testing::Test {
  protected:
-  ProjectionMatcherTest() : features_(random_features(400, 320, 240, random_)) {
-    grid_.build(features_.keypoints, 320, 240);
+  ProjectionMatcherTest() : features(random_features(400, 320, 240, random)) {
+    grid.build(features.keypoints, 320, 240);
   }
   ProjectionQuery query_of(int i, int flipped_bits) {
     const auto n = static_cast<size_t>(i);
-    const Keypoint& k = features_.keypoints[n];
+    const Keypoint& k = features.keypoints[n];
     return {.x = k.x + 2,
             .y = k.y - 1,
             .radius = 5,
             .min_octave = k.octave,
             .max_octave = k.octave,
             .angle = k.angle,
-            .descriptor = with_flipped_bits(features_.descriptors[n], flipped_bits, random_)};
+            .descriptor = with_flipped_bits(features.descriptors[n], flipped_bits, random)};
   }
-  ProjectionMatcher::Target target() const { return {features_, grid_, u_right_, taken_}; }
+  ProjectionMatcher::Target target() const { return {features, grid, u_right, taken}; }
 
-  Random random_{3};
-  Features features_;
-  KeypointGrid grid_;
-  std::vector<float> u_right_;
-  std::vector<uint8_t> taken_;
-  MatchOptions options_;
-  ProjectionMatcher matcher_;
-  std::vector<int> matches_;
+  Random random{3};
+  Features features;
+  KeypointGrid grid;
+  std::vector<float> u_right;
+  std::vector<uint8_t> taken;
+  MatchOptions options;
+  ProjectionMatcher matcher;
+  std::vector<int> matches;
 };
 
 TEST_F(ProjectionMatcherTest, FindsTheProjectedLandmarks) {
   std::vector<ProjectionQuery> queries;
   for (int i = 0; i < 400; ++i) queries.push_back(query_of(i, 30));
-  EXPECT_EQ(matcher_.match(options_, target(), queries, matches_), 400);
-  for (int i = 0; i < 400; ++i) EXPECT_EQ(matches_[static_cast<size_t>(i)], i);
+  EXPECT_EQ(matcher.match(options, target(), queries, matches), 400);
+  for (int i = 0; i < 400; ++i) EXPECT_EQ(matches[static_cast<size_t>(i)], i);
 }
 
 TEST_F(ProjectionMatcherTest, RespectsRadiusOctaveDistanceAndRightColumn) {
   ProjectionQuery far = query_of(5, 0), octave = query_of(6, 0), different = query_of(7, 0), right = query_of(8, 0);
   far.radius = 2.2f;  // The prediction is 2.24 px off.
-  octave.min_octave = octave.max_octave = features_.keypoints[6].octave + 1;
+  octave.min_octave = octave.max_octave = features.keypoints[6].octave + 1;
   for (uint64_t& word : different.descriptor) word ^= 0xFFFFFFFF;  // 128 bits differ.
   right.u_right = 100;
-  u_right_.assign(400, 120);
+  u_right.assign(400, 120);
   const ProjectionQuery queries[] = {far, octave, different, right};
-  EXPECT_EQ(matcher_.match(options_, target(), queries, matches_), 0);
-  u_right_[8] = std::nanf("");
-  EXPECT_EQ(matcher_.match(options_, target(), queries, matches_), 1);
-  EXPECT_EQ(matches_[3], 8);
-  taken_.assign(400, 0);
-  taken_[8] = 1;
-  EXPECT_EQ(matcher_.match(options_, target(), queries, matches_), 0);
+  EXPECT_EQ(matcher.match(options, target(), queries, matches), 0);
+  u_right[8] = std::nanf("");
+  EXPECT_EQ(matcher.match(options, target(), queries, matches), 1);
+  EXPECT_EQ(matches[3], 8);
+  taken.assign(400, 0);
+  taken[8] = 1;
+  EXPECT_EQ(matcher.match(options, target(), queries, matches), 0);
 }
 
 TEST_F(ProjectionMatcherTest, AKeypointGoesToTheMostSimilarLandmark) {
   const ProjectionQuery queries[] = {query_of(9, 40), query_of(9, 5), query_of(9, 60)};
-  EXPECT_EQ(matcher_.match(options_, target(), queries, matches_), 1);
-  EXPECT_EQ(matches_, (std::vector<int>{kNoMatch, 9, kNoMatch}));
+  EXPECT_EQ(matcher.match(options, target(), queries, matches), 1);
+  EXPECT_EQ(matches, (std::vector<int>{kNoMatch, 9, kNoMatch}));
 }
 
 TEST_F(ProjectionMatcherTest, RatioTestDropsTwinsOfTheSameOctave) {
-  features_.keypoints[11] = features_.keypoints[10];
-  features_.descriptors[11] = with_flipped_bits(features_.descriptors[10], 2, random_);
-  grid_.build(features_.keypoints, 320, 240);
-  options_.max_ratio = 0.8;
+  features.keypoints[11] = features.keypoints[10];
+  features.descriptors[11] = with_flipped_bits(features.descriptors[10], 2, random);
+  grid.build(features.keypoints, 320, 240);
+  options.max_ratio = 0.8;
   ProjectionQuery query = query_of(10, 30);
-  EXPECT_EQ(matcher_.match(options_, target(), {&query, 1}, matches_), 0);
-  features_.keypoints[11].octave += 1;
+  EXPECT_EQ(matcher.match(options, target(), {&query, 1}, matches), 0);
+  features.keypoints[11].octave += 1;
   query.max_octave += 1;
-  EXPECT_EQ(matcher_.match(options_, target(), {&query, 1}, matches_), 1);
+  EXPECT_EQ(matcher.match(options, target(), {&query, 1}, matches), 1);
 }
 
 TEST_F(ProjectionMatcherTest, DropsMatchesThatTurnedDifferently) {
@@ -155,9 +155,9 @@ TEST_F(ProjectionMatcherTest, DropsMatchesThatTurnedDifferently) {
     queries.back().angle -= i % 10 == 0 ? 1.0f + 0.05f * static_cast<float>(i) : 0.2f;
   }
   queries[10].angle = std::nanf("");
-  EXPECT_EQ(matcher_.match(options_, target(), queries, matches_), 91);
+  EXPECT_EQ(matcher.match(options, target(), queries, matches), 91);
   for (size_t i = 0; i < 100; ++i) {
-    EXPECT_EQ(matches_[i], i % 10 != 0 || i == 10 ? static_cast<int>(i) : kNoMatch);
+    EXPECT_EQ(matches[i], i % 10 != 0 || i == 10 ? static_cast<int>(i) : kNoMatch);
   }
 }
 

@@ -20,7 +20,7 @@ double median(std::vector<double> values) {
 
 TEST(CornerRefinement, ReducesTheError) {
   // The same scene twice, moved by a fraction of a pixel: how well does the distance between corners tell the motion?
-  const RectangleScene scene(400, 300, 150, 1);
+  const RectangleScene scene(400, 300, 80, 1);
   std::vector<double> pixel_errors, refined_errors;
   PaddedImage a(scene.render(400, 300, [](double&, double&) {}));
   std::vector<uint8_t> scratch;
@@ -94,7 +94,7 @@ TEST(Orb, FindsTheSamePointsAfterTurningAndScaling) {
 }
 
 TEST(Orb, GivesAboutAsManyAsAskedForEvenlySpread) {
-  const ImageU8 image = RectangleScene(640, 480, 300, 3).render(640, 480, [](double&, double&) {});
+  const ImageU8 image = RectangleScene(640, 480, 150, 3).render(640, 480, [](double&, double&) {});
   for (int count : {300, 1000}) {
     OrbOptions options;
     options.num_features = count;

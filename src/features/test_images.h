@@ -47,7 +47,8 @@ class RectangleScene {
       for (int x = 0; x < width; ++x) {
         double sum = 0;
         for (int i = 0; i < 9; ++i) {
-          double sx = x + (i % 3 - 1) * 0.67, sy = y + (i / 3 - 1) * 0.67;
+          const int u = i % 3 - 1, v = i / 3 - 1;
+          double sx = x + u * 0.67, sy = y + v * 0.67;
           scene_from_image(sx, sy);
           sum += (*this)(sx, sy);
         }
