@@ -27,16 +27,15 @@ class RectangleScene {
     }
   }
 
-  /// Grey level at a point.
+  /// Grey level at a point: that of the topmost rectangle, which is the last one.
   double operator()(double x, double y) const {
-    double value = 128;
-    for (const Rectangle& r : rectangles_) {
-      const double dx = x - r.x, dy = y - r.y;
-      if (std::abs(r.c * dx + r.s * dy) < r.half_width && std::abs(r.c * dy - r.s * dx) < r.half_height) {
-        value = r.grey + 20 * std::sin(r.wave_x * dx + r.wave_y * dy);
+    for (auto r = rectangles_.rbegin(); r != rectangles_.rend(); ++r) {
+      const double dx = x - r->x, dy = y - r->y;
+      if (std::abs(r->c * dx + r->s * dy) < r->half_width && std::abs(r->c * dy - r->s * dx) < r->half_height) {
+        return r->grey + 20 * std::sin(r->wave_x * dx + r->wave_y * dy);
       }
     }
-    return value;
+    return 128;
   }
 
   /// An image of the scene seen through scene_from_image, blurred a little like by a lens: 3x3 samples
