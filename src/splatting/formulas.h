@@ -219,9 +219,10 @@ PHOTOSLAM_FORMULA void project_backward(const AnchorView& view, const Projection
 
 inline constexpr float kSh0 = 0.28209479177387814f;
 inline constexpr float kSh1 = 0.4886025119029199f;
-inline constexpr float kSh2[3] = {1.0925484305920792f, 0.31539156525252005f, 0.5462742152960396f};
-inline constexpr float kSh3[5] = {-0.5900435899266435f, 2.890611442640554f, -0.4570457994644658f, 0.3731763325901154f,
-                                  1.445305721320277f};
+// Scalars, not arrays: device code cannot index constants of the host.
+inline constexpr float kSh2_0 = 1.0925484305920792f, kSh2_1 = 0.31539156525252005f, kSh2_2 = 0.5462742152960396f;
+inline constexpr float kSh3_0 = -0.5900435899266435f, kSh3_1 = 2.890611442640554f, kSh3_2 = -0.4570457994644658f;
+inline constexpr float kSh3_3 = 0.3731763325901154f, kSh3_4 = 1.445305721320277f;
 
 /// The real basis functions up to `degree` at a unit direction, in the order of 3DGS files.
 template <class T>
@@ -234,20 +235,20 @@ PHOTOSLAM_FORMULA void sh_basis(int degree, const T* direction, T* basis) {
   basis[3] = T(-kSh1) * x;
   if (degree < 2) return;
   const T xx = x * x, yy = y * y, zz = z * z, xy = x * y;
-  basis[4] = T(kSh2[0]) * xy;
-  basis[5] = T(-kSh2[0]) * (y * z);
-  basis[6] = T(kSh2[1]) * (zz + zz - xx - yy);
-  basis[7] = T(-kSh2[0]) * (x * z);
-  basis[8] = T(kSh2[2]) * (xx - yy);
+  basis[4] = T(kSh2_0) * xy;
+  basis[5] = T(-kSh2_0) * (y * z);
+  basis[6] = T(kSh2_1) * (zz + zz - xx - yy);
+  basis[7] = T(-kSh2_0) * (x * z);
+  basis[8] = T(kSh2_2) * (xx - yy);
   if (degree < 3) return;
   const T three(3.0f), four(4.0f);
-  basis[9] = T(kSh3[0]) * y * (three * xx - yy);
-  basis[10] = T(kSh3[1]) * xy * z;
-  basis[11] = T(kSh3[2]) * y * (four * zz - xx - yy);
-  basis[12] = T(kSh3[3]) * z * (zz + zz - three * (xx + yy));
-  basis[13] = T(kSh3[2]) * x * (four * zz - xx - yy);
-  basis[14] = T(kSh3[4]) * z * (xx - yy);
-  basis[15] = T(kSh3[0]) * x * (xx - three * yy);
+  basis[9] = T(kSh3_0) * y * (three * xx - yy);
+  basis[10] = T(kSh3_1) * xy * z;
+  basis[11] = T(kSh3_2) * y * (four * zz - xx - yy);
+  basis[12] = T(kSh3_3) * z * (zz + zz - three * (xx + yy));
+  basis[13] = T(kSh3_2) * x * (four * zz - xx - yy);
+  basis[14] = T(kSh3_4) * z * (xx - yy);
+  basis[15] = T(kSh3_0) * x * (xx - three * yy);
 }
 
 /// Gradient with respect to the direction of Σ_k weights[k] basis[k]; weights[0] is not used.
@@ -259,8 +260,8 @@ PHOTOSLAM_FORMULA void sh_basis_backward(int degree, const T* direction, const T
   if (degree < 1) return;
   T gx = T(-kSh1) * w[3], gy = T(-kSh1) * w[1], gz = T(kSh1) * w[2];
   if (degree >= 2) {
-    const T w4 = T(kSh2[0]) * w[4], w5 = T(-kSh2[0]) * w[5], w6 = T(2.0f * kSh2[1]) * w[6];
-    const T w7 = T(-kSh2[0]) * w[7], w8 = T(2.0f * kSh2[2]) * w[8];
+    const T w4 = T(kSh2_0) * w[4], w5 = T(-kSh2_0) * w[5], w6 = T(2.0f * kSh2_1) * w[6];
+    const T w7 = T(-kSh2_0) * w[7], w8 = T(2.0f * kSh2_2) * w[8];
     gx = gx + w4 * y + w7 * z + (w8 - w6) * x;
     gy = gy + w4 * x + w5 * z - (w8 + w6) * y;
     gz = gz + w5 * y + w7 * x + (w6 + w6) * z;
@@ -268,8 +269,8 @@ PHOTOSLAM_FORMULA void sh_basis_backward(int degree, const T* direction, const T
   if (degree >= 3) {
     const T xx = x * x, yy = y * y, zz = z * z, xy = x * y, xz = x * z, yz = y * z;
     const T three(3.0f), four(4.0f), six(6.0f), eight(8.0f);
-    const T w9 = T(kSh3[0]) * w[9], w10 = T(kSh3[1]) * w[10], w11 = T(kSh3[2]) * w[11], w12 = T(kSh3[3]) * w[12];
-    const T w13 = T(kSh3[2]) * w[13], w14 = T(kSh3[4]) * w[14], w15 = T(kSh3[0]) * w[15];
+    const T w9 = T(kSh3_0) * w[9], w10 = T(kSh3_1) * w[10], w11 = T(kSh3_2) * w[11], w12 = T(kSh3_3) * w[12];
+    const T w13 = T(kSh3_2) * w[13], w14 = T(kSh3_4) * w[14], w15 = T(kSh3_0) * w[15];
     gx = gx + six * xy * w9 + yz * w10 - (xy + xy) * w11 - six * xz * w12 + (four * zz - three * xx - yy) * w13 +
          (xz + xz) * w14 + three * (xx - yy) * w15;
     gy = gy + three * (xx - yy) * w9 + xz * w10 + (four * zz - xx - three * yy) * w11 - six * yz * w12 -
