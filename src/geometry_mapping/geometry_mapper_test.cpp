@@ -65,11 +65,16 @@ TEST_F(WalkTest, ExactFeaturesGiveAnExactMap) {
   EXPECT_GT(alive, 500u);
 }
 
-TEST_F(WalkTest, NoisyFeaturesGiveAPoseErrorFarBelowTheNoise) {
+TEST_F(WalkTest, NoisyFeaturesGiveTheAccuracyThatTheirNumberAllows) {
   PointWorld world;
   world.pixel_noise = 0.7;
   walk(world, 150);
-  EXPECT_LT(final_rmse(), 0.004);
+  // Depth is the weak direction: one point at distance z fixes it to z² √2 σ / bf, n points √n times better. The walls
+  // are about 3 m away, where points appear on octave 3, and some 400 are tracked. Poses are measured against the first
+  // one, which has an error of the same size.
+  const double sigma = world.pixel_noise * std::pow(PointWorld::kScaleFactor, 3);
+  const double one_pose = 3.0 * 3.0 * std::sqrt(2.0) * sigma / world.bf / std::sqrt(400.0);
+  EXPECT_LT(final_rmse(), std::sqrt(2.0) * one_pose);
 }
 
 TEST_F(WalkTest, LandmarksAreNotDuplicated) {

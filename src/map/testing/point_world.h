@@ -22,7 +22,7 @@ class PointWorld {
   static constexpr int kNumLevels = 8;
   static constexpr double kFarthest = 5.5;  ///< Distance [m] of points that appear on octave 0.
   PinholeCamera camera{640, 480, 525, 525, 321.5, 238.25};
-  double bf = 42;
+  double bf = 105;
   double pixel_noise = 0;  ///< σ [px] on octave 0
   double wrong_share = 0;  ///< Features displaced at random.
 
