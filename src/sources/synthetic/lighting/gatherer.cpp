@@ -60,17 +60,18 @@ Color Gatherer::direct(const Mesh::Surface& surface, uint32_t seed) const {
   return sum + from_sun(surface, seed + 77);
 }
 
-Color Gatherer::indirect(const Mesh::Surface& surface, uint32_t seed, const Radiance& radiance) const {
+Color Gatherer::indirect(const Mesh::Surface& surface, uint32_t seed, Sampling sampling,
+                         const Radiance& radiance) const {
+  const std::vector<Vec2f>& points = sampling == Sampling::fine ? hemisphere_ : disc_;
   const auto [tangent, bitangent] = orthogonal_axes(surface.normal);
   RayTracer::Rays rays;
   RayTracer::Hits hits;
   rays.origin = surface.position + kSurfaceOffset * surface.normal;
   const Eigen::Matrix2f turn = random_turn(seed);
   Color sum = Color::Zero();
-  constexpr int kTotal = kBounceSide * kBounceSide;
-  for (int first = 0; first < kTotal; first += RayTracer::kRays) {
+  for (size_t first = 0; first < points.size(); first += RayTracer::kRays) {
     for (int i = 0; i < RayTracer::kRays; ++i) {
-      const Vec2f d = turn * hemisphere_[static_cast<size_t>(first + i)];
+      const Vec2f d = turn * points[first + static_cast<size_t>(i)];
       const float up = std::sqrt(std::max(1e-4f, 1 - d.squaredNorm()));
       rays.set(i, d.x() * tangent + d.y() * bitangent + up * surface.normal);
     }
@@ -79,7 +80,7 @@ Color Gatherer::indirect(const Mesh::Surface& surface, uint32_t seed, const Radi
       if (hits.triangle[static_cast<size_t>(i)] >= 0) sum += radiance(hits, i, rays.direction(i));
     }
   }
-  return sum / static_cast<float>(kTotal);
+  return sum / static_cast<float>(points.size());
 }
 
 std::pair<Color, float> Gatherer::from_area(const AreaLight& light, const Mesh::Surface& surface, uint32_t seed) const {

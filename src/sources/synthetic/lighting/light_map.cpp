@@ -89,7 +89,7 @@ LightMap::LightMap(const Mesh& mesh, std::span<const Texture> textures, const Ra
   add_direct(mesh, gatherer, executor);
   const std::vector<Color> direct = nodes_;
   for (int i = 0; i < bounces; ++i) {
-    const std::vector<Color> indirect = bounce(mesh, textures, gatherer, static_cast<uint32_t>(i), executor);
+    const std::vector<Color> indirect = bounce(mesh, textures, gatherer, i, executor);
     for (size_t node = 0; node < nodes_.size(); ++node) nodes_[node] = direct[node] + indirect[node];
   }
 }
@@ -111,7 +111,7 @@ void LightMap::add_direct(const Mesh& mesh, const Gatherer& gatherer, Executor& 
 }
 
 std::vector<Color> LightMap::bounce(const Mesh& mesh, std::span<const Texture> textures, const Gatherer& gatherer,
-                                    uint32_t seed, Executor& executor) const {
+                                    int index, Executor& executor) const {
   const auto radiance = [&](const RayTracer::Hits& hits, int ray, const Vec3f& direction) -> Color {
     const size_t k = static_cast<size_t>(ray);
     const Mesh::Hit hit = mesh.hit(hits.triangle[k], hits.u[k], hits.v[k]);
@@ -122,16 +122,18 @@ std::vector<Color> LightMap::bounce(const Mesh& mesh, std::span<const Texture> t
     const Texture& texture = textures[static_cast<size_t>(hit.material.texture)];
     return texture.sample(place.x(), place.y(), kFootprint) * sample(hit.patch, hit.uv);
   };
+  // Light of later bounces is dim and even.
+  const Gatherer::Sampling sampling = index == 0 ? Gatherer::Sampling::fine : Gatherer::Sampling::coarse;
   std::vector<Color> indirect(mesh.light_nodes);
   executor.for_each(static_cast<int>(mesh.patches.size()), [&](int p, int) {
     const Patch& patch = mesh.patches[static_cast<size_t>(p)];
     const Material& material = mesh.materials[static_cast<size_t>(patch.material)];
     CoarseGrid grid(patch);
     for (int k = 0; k < grid.width * grid.height; ++k) {
-      const uint32_t node_seed = hash(static_cast<int>(patch.light_offset) + k, static_cast<int>(seed), 9);
-      grid.nodes[static_cast<size_t>(k)] =
-          both_sides(material, node_surface(mesh, patch, k % grid.width, grid.width, k / grid.width, grid.height),
-                     [&](const Mesh::Surface& surface) { return gatherer.indirect(surface, node_seed, radiance); });
+      const uint32_t node_seed = hash(static_cast<int>(patch.light_offset) + k, index, 9);
+      grid.nodes[static_cast<size_t>(k)] = both_sides(
+          material, node_surface(mesh, patch, k % grid.width, grid.width, k / grid.width, grid.height),
+          [&](const Mesh::Surface& surface) { return gatherer.indirect(surface, node_seed, sampling, radiance); });
     }
     if (grid.width > 2 && grid.height > 2) blur(grid.nodes, grid.width, grid.height);
     for_each_node(patch, [&](size_t node, int i, int j) {

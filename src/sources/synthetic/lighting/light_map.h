@@ -23,9 +23,9 @@ class LightMap {
 
  private:
   void add_direct(const Mesh& mesh, const Gatherer& gatherer, Executor& executor);
-  /// The light after one more bounce, given what the nodes hold now.
-  std::vector<Color> bounce(const Mesh& mesh, std::span<const Texture> textures, const Gatherer& gatherer,
-                            uint32_t seed, Executor& executor) const;
+  /// The light that bounces off the surfaces as the nodes light them now; `index` counts the bounces.
+  std::vector<Color> bounce(const Mesh& mesh, std::span<const Texture> textures, const Gatherer& gatherer, int index,
+                            Executor& executor) const;
 
   std::vector<Color> nodes_;
 };
