@@ -26,7 +26,8 @@ inline constexpr CellCoordinates kCells = [] {
   for (int cell = 0; cell < kCellsPerRow; ++cell)
     for (int i = 0; i < kCellPixels; ++i) {
       c.x[cell][i] = static_cast<float>(cell * kCellSize + i % kCellSize);
-      c.y[cell][i] = static_cast<float>(cell * kCellSize + i / kCellSize);
+      const int row = i / kCellSize;
+      c.y[cell][i] = static_cast<float>(cell * kCellSize + row);
     }
   return c;
 }();

@@ -26,14 +26,17 @@ struct Cover {
   double light_spacing = 0.04;  ///< Between nodes of the light map [m].
 
   Cover() = default;
+  // NOLINTNEXTLINE(google-explicit-constructor): a material alone is a cover
   Cover(int m, Fit f = Fit::random, double spacing = 0.04) : material(m), fit(f), light_spacing(spacing) {}
 };
 
 /// Covers of the six sides of a box; sides without a cover do not exist.
 struct BoxCovers {
   Cover front, back, left, right, top, bottom;
+  // NOLINTBEGIN(google-explicit-constructor): one cover, or one material, for all sides
   BoxCovers(const Cover& all) : front(all), back(all), left(all), right(all), top(all), bottom(all) {}
   BoxCovers(int material) : BoxCovers(Cover(material)) {}
+  // NOLINTEND(google-explicit-constructor)
 };
 
 /// Collects surfaces into a mesh. Sizes in metres.
