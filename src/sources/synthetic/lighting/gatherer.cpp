@@ -22,7 +22,8 @@ static_assert(kSide * kSide == RayTracer::kRays);
 /// Stratum i of the square [-1, 1]², shifted by a random amount that wraps around.
 Vec2f on_square(int i, uint32_t seed) {
   const float x = (static_cast<float>(i % kSide) + 0.5f) / kSide + hash01(1, 0, seed);
-  const float y = (static_cast<float>(i / kSide) + 0.5f) / kSide + hash01(2, 0, seed);
+  const int row = i / kSide;
+  const float y = (static_cast<float>(row) + 0.5f) / kSide + hash01(2, 0, seed);
   return {2 * (x - std::floor(x)) - 1, 2 * (y - std::floor(y)) - 1};
 }
 
@@ -32,7 +33,8 @@ std::vector<Vec2f> disc_points(int count) {
   std::vector<Vec2f> points;
   for (int i = 0; i < count * count; ++i) {
     const float a = 2 * (static_cast<float>(i % count) + 0.5f) / static_cast<float>(count) - 1;
-    const float b = 2 * (static_cast<float>(i / count) + 0.5f) / static_cast<float>(count) - 1;
+    const int row = i / count;
+    const float b = 2 * (static_cast<float>(row) + 0.5f) / static_cast<float>(count) - 1;
     const bool wide = std::abs(a) > std::abs(b);
     const float r = wide ? a : b, angle = wide ? kPi / 4 * (b / a) : kPi / 2 - kPi / 4 * (a / b);
     points.push_back({r * std::cos(angle), r * std::sin(angle)});

@@ -51,7 +51,7 @@ void blur(std::vector<Color>& nodes, int width, int height) {
 /// Calls gather(surface) at a point; thin materials get the mean of both sides.
 template <class Gather>
 Color both_sides(const Material& material, Mesh::Surface surface, const Gather& gather) {
-  const Color front = gather(surface);
+  Color front = gather(surface);
   if (material.translucency <= 0) return front;
   surface.normal = -surface.normal;
   return mix(front, gather(surface), material.translucency);
