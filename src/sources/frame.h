@@ -25,9 +25,17 @@ struct Frame {
   int64_t timestamp_ns = 0;
   ImageU8 color;   ///< RGB, or grey with one channel.
   ImageU16 depth;  ///< RGB-D only, registered to the colour image; metres = value * SourceInfo::metres_per_depth_unit.
+  ImageU8 right;   ///< Stereo only: the other camera's image of the same moment, with as many channels as `color`.
   /// Empty when the frame is usable; otherwise why not (unreadable file, wrong size, …). Such frames are counted as
   /// lost and skipped, never fatal; their images may be empty.
   std::string defect;
+};
+
+/// The second camera of a stereo rig, as calibrated: images are not rectified yet.
+struct RightCamera {
+  PinholeCamera camera;
+  Distortion distortion;
+  SE3 right_from_left;
 };
 
 /// What a source knows before its first frame.
@@ -37,6 +45,7 @@ struct SourceInfo {
   SensorKind sensor = SensorKind::rgbd;
   PinholeCamera camera;  ///< Raw intrinsics; with a distortion, those of the distorted image.
   Distortion distortion;
+  std::optional<RightCamera> right;  ///< Present exactly with stereo sensors.
   double metres_per_depth_unit = 0.0;
   double frames_per_second = 0.0;  ///< Nominal.
   int num_frames = 0;              ///< 0 when not known in advance.
