@@ -6,6 +6,8 @@
 #include <cmath>
 #include <type_traits>
 
+#include "math/median.h"
+
 namespace photoslam {
 namespace {
 
@@ -59,9 +61,7 @@ ImageU16 shrink_depth(const ImageU16& depth, int factor) {
         std::copy_if(source, source + factor, std::back_inserter(block), [](uint16_t d) { return d != 0; });
       }
       if (2 * static_cast<int>(block.size()) < factor * factor) continue;
-      const auto middle = block.begin() + static_cast<std::ptrdiff_t>((block.size() - 1) / 2);
-      std::nth_element(block.begin(), middle, block.end());
-      result(x, y) = *middle;
+      result(x, y) = lower_median(block);
     }
   }
   return result;

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "base/check.h"
+#include "math/median.h"
 
 namespace photoslam {
 namespace {
@@ -286,10 +287,7 @@ double Tracker::median_depth(const SE3& camera_from_world, const Matches& matche
   for (size_t i = 0; i < matches.position.size(); ++i) {
     if (matches.matched[i]) depths.push_back((camera_from_world * matches.position[i]).z());
   }
-  if (depths.empty()) return 0;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
+  return depths.empty() ? 0 : lower_median(depths);
 }
 
 KeyframeProposal Tracker::propose(const std::shared_ptr<const FeatureFrame>& frame, const TrackingResult& result,

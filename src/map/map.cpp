@@ -7,6 +7,7 @@
 #include <map>
 
 #include "base/check.h"
+#include "math/median.h"
 
 namespace photoslam {
 namespace {
@@ -20,10 +21,8 @@ Descriptor most_central(const std::vector<const Descriptor*>& descriptors) {
   std::vector<int> distances(descriptors.size());
   for (size_t i = 0; i < descriptors.size(); ++i) {
     for (size_t j = 0; j < descriptors.size(); ++j) distances[j] = hamming_distance(*descriptors[i], *descriptors[j]);
-    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>((distances.size() - 1) / 2);
-    std::nth_element(distances.begin(), middle, distances.end());
-    if (*middle < best_median) {
-      best_median = *middle;
+    if (const int median = lower_median(distances); median < best_median) {
+      best_median = median;
       best = i;
     }
   }
@@ -35,10 +34,7 @@ double median_landmark_depth(const Map& map, const Keyframe& keyframe) {
   for (const LandmarkId id : keyframe.landmarks) {
     if (id.valid()) depths.push_back((keyframe.camera_from_world * map.landmark(id).view.position).z());
   }
-  if (depths.empty()) return 0;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
+  return depths.empty() ? 0 : lower_median(depths);
 }
 
 }  // namespace

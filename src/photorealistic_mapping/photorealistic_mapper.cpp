@@ -6,18 +6,13 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "math/median.h"
 #include "photorealistic_mapping/view_geometry.h"
 
 namespace photoslam {
 namespace {
 
 constexpr int kSeedingFactor = 2;  // seeds are made on the half-size image: cheaper, and its noise is lower
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Inactive features (without a landmark) that have a depth, and landmarks where the map has them.
 std::vector<DepthPixel> feature_seeds(const MapSnapshot& map, const Keyframe& keyframe) {
@@ -84,7 +79,7 @@ void PhotorealisticMapper::update_poses(const MapSnapshot& map) {
     anchors_from_world_[i] = keyframe.keyframe.camera_from_world;
     if (keyframe.median_depth > 0) depths.push_back(keyframe.median_depth);
   }
-  if (!depths.empty()) scene_depth_ = median(std::move(depths));
+  if (!depths.empty()) scene_depth_ = lower_median(depths);
 }
 
 void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, const KeyframeImages& images,

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <deque>
 
+#include "math/median.h"
 #include "math/se3.h"
 
 namespace photoslam {
@@ -47,9 +48,7 @@ double median_depth(const ImageU16& depth, const Cell& cell, double metres_per_u
   }
   const auto pixels = static_cast<size_t>((cell.x1 - cell.x0) * (cell.y1 - cell.y0));
   if (values.empty() || 4 * values.size() < pixels) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle * metres_per_unit;
+  return lower_median(values) * metres_per_unit;
 }
 
 Cell summarize_cell(const CameraView& view, double metres_per_depth_unit, const splatting::RenderResult& render,

@@ -263,6 +263,7 @@ RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress)
     mapping_.set_freeze_time(std::chrono::steady_clock::now() +
                              std::chrono::milliseconds(static_cast<int>(1e3 * kOnlineGraceSeconds)));
   }
+  if (on_progress) on_progress(progress(Progress::Phase::draining));
   mapping_stage_.finish();
   outcome_.online = mapping_.take_online();
   outcome_.seconds_drain = drain.seconds();
