@@ -12,6 +12,7 @@
 #include "evaluation/report_html.h"
 #include "evaluation/run_evaluation.h"
 #include "interrupt.h"
+#include "pipeline/frame_rectifier.h"
 #include "pipeline/system.h"
 #include "progress_line.h"
 #include "result_table.h"
@@ -65,7 +66,7 @@ void announce(const SourceInfo& info, const RunArguments& arguments) {
 Status save_and_evaluate(const RunArguments& arguments, const SystemOptions& options, const RunSettings& settings,
                          const SourceInfo& info, const RunOutcome& run) {
   const RunDescription description{
-      arguments.dataset, {arguments.format, arguments.camera}, info.camera, settings.hold_out};
+      arguments.dataset, {arguments.format, arguments.camera}, FrameRectifier(info).camera(), settings.hold_out};
   size_t map_bytes = 0;
   if (Status status = write_run_description(arguments.output, description); !status) return status;
   if (Status status = write_run_results(arguments.output, run, map_bytes); !status) return status;

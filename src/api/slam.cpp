@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "api/splat_map_state.h"
-#include "image/undistort.h"
 #include "photorealistic_mapping/world_export.h"
 #include "pipeline/config.h"
+#include "pipeline/frame_rectifier.h"
 #include "pipeline/system.h"
 #include "sources/open_source.h"
 
@@ -104,8 +104,7 @@ SlamResult map_source(FrameSource& source, const SlamSettings& settings, const K
   }
   result.trajectory = to_poses(final_trajectory(run));
   result.keyframes = to_poses(keyframe_trajectory(run));
-  const PinholeCamera camera =
-      info.distortion.none() ? info.camera : Undistorter(info.camera, info.distortion).camera();
+  const PinholeCamera camera = FrameRectifier(info).camera();
   result.camera = {camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, {}};
   result.map = SplatMapAccess::make(to_world(run.final.gaussians, run.final.anchors_from_world));
   result.failure = run.failure;

@@ -6,8 +6,8 @@
 
 #include "base/clock.h"
 #include "image/convert.h"
-#include "image/undistort.h"
 #include "photorealistic_mapping/view_geometry.h"
+#include "pipeline/frame_rectifier.h"
 
 namespace photoslam {
 namespace {
@@ -58,10 +58,8 @@ ImageF to_image(const splatting::RenderResult& render) {
 
 std::vector<MapScores> score_maps(FrameSource& source, std::span<const ScoringTask> tasks,
                                   std::span<const FrameId> pair_frames, Executor& executor) {
-  const SourceInfo& info = source.info();
-  std::optional<Undistorter> undistorter;
-  if (!info.distortion.none()) undistorter.emplace(info.camera, info.distortion);
-  const ImageU8 mask = undistorter ? undistorter->mask() : ImageU8{};
+  const FrameRectifier rectifier(source.info());
+  const ImageU8 mask = rectifier.mask();
   std::vector<Worker> workers(static_cast<size_t>(executor.concurrency()));
   std::vector<MapScores> scores(tasks.size());
   std::vector<std::vector<double>> render_ms(tasks.size());
@@ -72,7 +70,7 @@ std::vector<MapScores> score_maps(FrameSource& source, std::span<const ScoringTa
   const auto flush = [&] {
     executor.for_each(static_cast<int>(jobs.size()), [&](int i, int worker) {
       Job& job = jobs[static_cast<size_t>(i)];
-      workers[static_cast<size_t>(worker)].run(tasks[job.task], info.camera, mask, job);
+      workers[static_cast<size_t>(worker)].run(tasks[job.task], rectifier.camera(), mask, job);
     });
     for (Job& job : jobs) {
       MapScores& result = scores[job.task];
@@ -90,7 +88,7 @@ std::vector<MapScores> score_maps(FrameSource& source, std::span<const ScoringTa
   images.reserve(kBatch);
   while (auto frame = source.next()) {
     if (!frame->defect.empty() || frame->color.empty()) continue;
-    images.push_back(to_rgb(undistorter ? undistorter->color(frame->color) : std::move(frame->color)));
+    images.push_back(to_rgb(rectifier.color(std::move(frame->color))));
     for (size_t task = 0; task < tasks.size(); ++task) {
       const auto& poses = tasks[task].camera_from_world;
       const auto id = static_cast<size_t>(frame->id.value);

@@ -44,6 +44,8 @@ OrbExtractor::~OrbExtractor() = default;
 OrbExtractor::OrbExtractor(OrbExtractor&&) noexcept = default;
 OrbExtractor& OrbExtractor::operator=(OrbExtractor&&) noexcept = default;
 
+const GreyPyramid& OrbExtractor::pyramid() const { return state_->pyramid; }
+
 void OrbExtractor::State::extract_level(int octave, int count, Features& features) {
   const GreyView image = pyramid.level(octave);
   corners.clear();

@@ -12,6 +12,8 @@
 
 namespace photoslam {
 
+class GreyPyramid;
+
 /// A 256-bit binary descriptor.
 using Descriptor = std::array<uint64_t, 4>;
 
@@ -67,6 +69,9 @@ class OrbExtractor {
 
   /// `grey` has one channel. Images smaller than 64 pixels on a side give no features.
   void extract(const ImageU8& grey, Features& features);
+
+  /// The levels on which the features of the last image were found.
+  const GreyPyramid& pyramid() const;
 
  private:
   struct State;

@@ -22,8 +22,9 @@ void GeometryMapperOptions::visit(OptionVisitor& v) {
   v.value(
       {"min_found_ratio", "", 0.0, 1.0, "Young landmarks matched in fewer of the frames that see them are removed."},
       min_found_ratio);
-  v.value({"max_landmark_depth_m", "m", 0.1, 1000.0, "Farther depth measurements do not make landmarks."},
-          max_landmark_depth_m);
+  v.value({"max_landmark_depth_baselines", "", 1.0, 1000.0,
+           "Depth, in baselines of the stereo or depth camera, up to which one view makes a landmark."},
+          max_landmark_depth_baselines);
   v.group("bundle", "The local bundle adjustment.", bundle);
 }
 
@@ -84,10 +85,11 @@ int GeometryMapper::cull_recent_landmarks(KeyframeId current) {
 int GeometryMapper::create_landmarks(KeyframeId id) {
   const Keyframe& keyframe = map_.keyframe(id);
   const SE3 world_from_camera = keyframe.camera_from_world.inverse();
+  const double max_depth = options_.max_landmark_depth_baselines * bf_ / camera_.fx;
   int created = 0;
   for (size_t i = 0; i < keyframe.frame->size(); ++i) {
     const auto depth = static_cast<double>(keyframe.frame->depth[i]);
-    if (keyframe.landmarks[i].valid() || !(depth > 0) || depth > options_.max_landmark_depth_m) continue;
+    if (keyframe.landmarks[i].valid() || !(depth > 0) || depth > max_depth) continue;
     const Vec3 point = world_from_camera * camera_.unproject(keyframe.frame->observations[i].pixel, depth);
     recent_landmarks_.push_back(map_.add_landmark(point, id, static_cast<int>(i)));
     ++created;

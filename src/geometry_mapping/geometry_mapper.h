@@ -21,7 +21,7 @@ struct GeometryMapperOptions {
   int fusion_keyframes = 8;
   double fusion_radius_px = 3.0;
   double min_found_ratio = 0.25;
-  double max_landmark_depth_m = 6.0;
+  double max_landmark_depth_baselines = 30.0;
   BundleOptions bundle;
   void visit(OptionVisitor& visitor);
 };

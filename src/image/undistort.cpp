@@ -19,28 +19,36 @@ std::pair<uint16_t, uint16_t> split(double position, int size) {
 
 }  // namespace
 
-Undistorter::Undistorter(const PinholeCamera& camera, const Distortion& distortion)
-    : camera_(camera), mask_(camera.width, camera.height), taps_(mask_.values().size()) {
-  PHOTOSLAM_CHECK(camera.width >= 2 && camera.height >= 2, "{}x{}", camera.width, camera.height);
+Undistorter::Undistorter(const PinholeCamera& lens, const Distortion& distortion, const PinholeCamera& result,
+                         const Quat& result_from_lens)
+    : lens_width_(lens.width),
+      lens_height_(lens.height),
+      camera_(result),
+      mask_(result.width, result.height),
+      taps_(mask_.values().size()) {
+  PHOTOSLAM_CHECK(lens.width >= 2 && lens.height >= 2, "{}x{}", lens.width, lens.height);
+  const Mat3 lens_from_result = result_from_lens.inverse().toRotationMatrix();
   Tap* tap = taps_.data();
-  for (int y = 0; y < camera.height; ++y) {
-    for (int x = 0; x < camera.width; ++x, ++tap) {
-      const Vec2 ray((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy);
+  for (int y = 0; y < result.height; ++y) {
+    for (int x = 0; x < result.width; ++x, ++tap) {
+      const Vec3 ray = lens_from_result * result.unproject(Vec2(x, y), 1.0);
+      if (!(ray.z() > 0)) continue;
       Eigen::Matrix2d jacobian;
-      const Vec2 bent = distort(distortion, ray, &jacobian);
-      const Vec2 pixel(camera.fx * bent.x() + camera.cx, camera.fy * bent.y() + camera.cy);
+      const Vec2 bent = distort(distortion, ray.head<2>() / ray.z(), &jacobian);
+      const Vec2 pixel(lens.fx * bent.x() + lens.cx, lens.fy * bent.y() + lens.cy);
       // Behind a fold of the model, rays would come back into the image that the lens never saw.
       const bool in_order = jacobian.trace() > 0 && jacobian.determinant() > 0;
-      if (!camera.contains(pixel) || !in_order) continue;
+      if (!lens.contains(pixel) || !in_order) continue;
       mask_(x, y) = 255;
-      std::tie(tap->x, tap->fx) = split(pixel.x(), camera.width);
-      std::tie(tap->y, tap->fy) = split(pixel.y(), camera.height);
+      std::tie(tap->x, tap->fx) = split(pixel.x(), lens.width);
+      std::tie(tap->y, tap->fy) = split(pixel.y(), lens.height);
     }
   }
 }
 
 ImageU8 Undistorter::color(const ImageU8& distorted) const {
-  PHOTOSLAM_CHECK(distorted.same_size(mask_), "{}x{}", distorted.width(), distorted.height());
+  PHOTOSLAM_CHECK(distorted.width() == lens_width_ && distorted.height() == lens_height_, "{}x{}", distorted.width(),
+                  distorted.height());
   const int channels = distorted.channels();
   ImageU8 result(camera_.width, camera_.height, channels);
   const auto mask = mask_.values();
@@ -61,8 +69,8 @@ ImageU8 Undistorter::color(const ImageU8& distorted) const {
 }
 
 ImageU16 Undistorter::depth(const ImageU16& distorted) const {
-  PHOTOSLAM_CHECK(distorted.same_size(mask_) && distorted.channels() == 1, "{}x{}x{}", distorted.width(),
-                  distorted.height(), distorted.channels());
+  PHOTOSLAM_CHECK(distorted.width() == lens_width_ && distorted.height() == lens_height_ && distorted.channels() == 1,
+                  "{}x{}x{}", distorted.width(), distorted.height(), distorted.channels());
   ImageU16 result(camera_.width, camera_.height);
   const auto mask = mask_.values();
   const auto target = result.values();

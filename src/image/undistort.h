@@ -11,18 +11,23 @@
 
 namespace photoslam {
 
-/// Resamples images of a lens with distortion to what a pinhole camera with the same intrinsics sees.
+/// Resamples images of a lens with distortion to what a pinhole camera at the same place sees.
 class Undistorter {
  public:
   /// `camera` holds the intrinsics of the distorted image; it is also the camera of the result.
-  Undistorter(const PinholeCamera& camera, const Distortion& distortion);
+  Undistorter(const PinholeCamera& camera, const Distortion& distortion)
+      : Undistorter(camera, distortion, camera, Quat::Identity()) {}
+
+  /// `result` is any other camera, turned about the common centre by `result_from_lens`.
+  Undistorter(const PinholeCamera& lens, const Distortion& distortion, const PinholeCamera& result,
+              const Quat& result_from_lens);
 
   const PinholeCamera& camera() const { return camera_; }
 
   /// 255 where the result has data, 0 where the lens did not see.
   const ImageU8& mask() const { return mask_; }
 
-  /// Bilinear; black where there is no data. The image has the camera's size, any number of channels.
+  /// Bilinear; black where there is no data. The image has the lens's size, any number of channels.
   ImageU8 color(const ImageU8& distorted) const;
 
   /// Nearest neighbour, because depths of two surfaces must not be mixed; 0 where there is no data.
@@ -35,6 +40,7 @@ class Undistorter {
     uint16_t fx = 0, fy = 0;  // 0…256
   };
 
+  int lens_width_, lens_height_;
   PinholeCamera camera_;
   ImageU8 mask_;
   std::vector<Tap> taps_;  // [H, W]

@@ -16,31 +16,51 @@ void DepthOptions::visit(OptionVisitor& v) {
           max_edge_ratio);
 }
 
-FeatureFrameBuilder::FeatureFrameBuilder(const OrbOptions& orb, const DepthOptions& depth, const PinholeCamera& camera,
-                                         double metres_per_depth_unit)
+FeatureFrameBuilder::FeatureFrameBuilder(const OrbOptions& orb, const DepthOptions& depth, const StereoOptions& stereo,
+                                         const PinholeCamera& camera, const DepthSensor& sensor)
     : orb_options_(orb),
       depth_options_(depth),
-      camera_(camera),
-      metres_per_depth_unit_(metres_per_depth_unit),
-      extractor_(orb) {}
+      sensor_(sensor),
+      bf_(camera.fx * (sensor.metres_per_unit > 0 ? depth.virtual_baseline_m : sensor.baseline_m)),
+      extractor_(orb),
+      stereo_matcher_(stereo) {}
 
 float FeatureFrameBuilder::depth_at(const ImageU16& depth, const Keypoint& keypoint) const {
   const int x = static_cast<int>(std::lround(keypoint.x));
   const int y = static_cast<int>(std::lround(keypoint.y));
   if (x < 1 || y < 1 || x >= depth.width() - 1 || y >= depth.height() - 1) return 0.0f;
-  const double centre = depth(x, y) * metres_per_depth_unit_;
+  const double centre = depth(x, y) * sensor_.metres_per_unit;
   if (centre < depth_options_.min_m || centre > depth_options_.max_m) return 0.0f;
   for (int dy = -1; dy <= 1; ++dy) {
     for (int dx = -1; dx <= 1; ++dx) {
-      const double neighbour = depth(x + dx, y + dy) * metres_per_depth_unit_;
+      const double neighbour = depth(x + dx, y + dy) * sensor_.metres_per_unit;
       if (std::abs(neighbour - centre) > depth_options_.max_edge_ratio * centre) return 0.0f;
     }
   }
   return static_cast<float>(centre);
 }
 
+void FeatureFrameBuilder::add_measured_depth(const ImageU16& depth, FeatureFrame& frame) const {
+  for (size_t i = 0; i < frame.size(); ++i) {
+    const Keypoint& keypoint = frame.features.keypoints[i];
+    frame.depth[i] = depth_at(depth, keypoint);
+    if (frame.depth[i] > 0) frame.observations[i].u_right = keypoint.x - bf_ / static_cast<double>(frame.depth[i]);
+  }
+}
+
+void FeatureFrameBuilder::add_stereo_depth(const ImageU8& right, FeatureFrame& frame) {
+  right_pyramid_.build(right, orb_options_.num_levels, orb_options_.scale_factor);
+  const double max_disparity = bf_ / (stereo_matcher_.options().min_depth_baselines * sensor_.baseline_m);
+  stereo_matcher_.match(extractor_.pyramid(), frame.features.keypoints, right_pyramid_, max_disparity, disparity_);
+  for (size_t i = 0; i < frame.size(); ++i) {
+    if (std::isnan(disparity_[i])) continue;
+    frame.depth[i] = static_cast<float>(bf_) / disparity_[i];
+    frame.observations[i].u_right = static_cast<double>(frame.features.keypoints[i].x - disparity_[i]);
+  }
+}
+
 std::shared_ptr<const FeatureFrame> FeatureFrameBuilder::build(FrameId id, int64_t timestamp_ns, const ImageU8& grey,
-                                                               const ImageU16& depth) {
+                                                               const ImageU16& depth, const ImageU8& right) {
   auto frame = std::make_shared<FeatureFrame>();
   frame->frame = id;
   frame->timestamp_ns = timestamp_ns;
@@ -50,12 +70,11 @@ std::shared_ptr<const FeatureFrame> FeatureFrameBuilder::build(FrameId id, int64
   frame->observations.resize(n);
   for (size_t i = 0; i < n; ++i) {
     const Keypoint& keypoint = frame->features.keypoints[i];
-    PixelObservation& observation = frame->observations[i];
-    observation.pixel = {keypoint.x, keypoint.y};
-    observation.inverse_variance = std::pow(orb_options_.scale_factor, -2 * keypoint.octave);
-    if (!depth.empty()) frame->depth[i] = depth_at(depth, keypoint);
-    if (frame->depth[i] > 0) observation.u_right = keypoint.x - bf() / static_cast<double>(frame->depth[i]);
+    frame->observations[i].pixel = {keypoint.x, keypoint.y};
+    frame->observations[i].inverse_variance = std::pow(orb_options_.scale_factor, -2 * keypoint.octave);
   }
+  if (sensor_.metres_per_unit > 0 && !depth.empty()) add_measured_depth(depth, *frame);
+  if (sensor_.baseline_m > 0 && !right.empty()) add_stereo_depth(right, *frame);
   frame->grid.build(frame->features.keypoints, grey.width(), grey.height());
   return frame;
 }

@@ -7,6 +7,7 @@
 #include "base/options.h"
 #include "camera/pinhole.h"
 #include "features/orb.h"
+#include "features/stereo_matching.h"
 #include "map/keyframe.h"
 
 namespace photoslam {
@@ -19,27 +20,39 @@ struct DepthOptions {
   void visit(OptionVisitor& visitor);
 };
 
-/// Turns an undistorted image (with depth) into features with observations. Keeps its buffers between calls.
+/// How a sensor measures depth: by depth images, by a second camera, or not at all.
+struct DepthSensor {
+  double metres_per_unit = 0;  ///< Of depth images; 0: there are none.
+  double baseline_m = 0;       ///< Of a rectified stereo pair; 0: there is no second camera.
+};
+
+/// Turns the rectified images of a moment into features with observations. Keeps its buffers between calls.
 class FeatureFrameBuilder {
  public:
-  FeatureFrameBuilder(const OrbOptions& orb, const DepthOptions& depth, const PinholeCamera& camera,
-                      double metres_per_depth_unit);
+  FeatureFrameBuilder(const OrbOptions& orb, const DepthOptions& depth, const StereoOptions& stereo,
+                      const PinholeCamera& camera, const DepthSensor& sensor);
 
-  /// fx * virtual baseline [px m].
-  double bf() const { return camera_.fx * depth_options_.virtual_baseline_m; }
+  /// fx * baseline [px m], real for stereo, virtual with depth images; 0 when nothing measures depth.
+  double bf() const { return bf_; }
 
-  /// `depth` may be empty; else it has the size of `grey`. Keypoints on depth edges and holes get no depth.
+  /// `depth` and `right` may be empty; else they have the size of `grey`. Keypoints on depth edges and holes, or
+  /// without a match in the right image, get no depth.
   std::shared_ptr<const FeatureFrame> build(FrameId id, int64_t timestamp_ns, const ImageU8& grey,
-                                            const ImageU16& depth);
+                                            const ImageU16& depth, const ImageU8& right = {});
 
  private:
   float depth_at(const ImageU16& depth, const Keypoint& keypoint) const;
+  void add_measured_depth(const ImageU16& depth, FeatureFrame& frame) const;
+  void add_stereo_depth(const ImageU8& right, FeatureFrame& frame);
 
   OrbOptions orb_options_;
   DepthOptions depth_options_;
-  PinholeCamera camera_;
-  double metres_per_depth_unit_;
+  DepthSensor sensor_;
+  double bf_;
   OrbExtractor extractor_;
+  GreyPyramid right_pyramid_;
+  StereoMatcher stereo_matcher_;
+  std::vector<float> disparity_;
 };
 
 }  // namespace photoslam

@@ -8,6 +8,11 @@
 namespace photoslam {
 namespace {
 
+DepthSensor depth_sensor(const SourceInfo& info, double baseline_m) {
+  return {.metres_per_unit = info.sensor == SensorKind::rgbd ? info.metres_per_depth_unit : 0,
+          .baseline_m = baseline_m};
+}
+
 double milliseconds(SteadyTime from, SteadyTime to) {
   return std::chrono::duration<double, std::milli>(to - from).count();
 }
@@ -17,12 +22,9 @@ double milliseconds(SteadyTime from, SteadyTime to) {
 LocalizationWorker::LocalizationWorker(const SystemOptions& options, const RunSettings& settings,
                                        const SourceInfo& info)
     : settings_(settings),
-      info_(info),
-      camera_(info.camera),
-      builder_(options.features, options.depth, info.camera, info.metres_per_depth_unit),
-      tracker_(options.localization, options.features, info.camera, builder_.bf()) {
-  if (!info.distortion.none()) undistorter_.emplace(info.camera, info.distortion);
-}
+      rectifier_(info),
+      builder_(options.features, options.depth, options.stereo, camera(), depth_sensor(info, rectifier_.baseline_m())),
+      tracker_(options.localization, options.features, camera(), builder_.bf()) {}
 
 bool LocalizationWorker::is_mapped(const Frame& frame) {
   if (!first_ns_) first_ns_ = frame.timestamp_ns;
@@ -44,9 +46,11 @@ FrameOutcome LocalizationWorker::process(FedFrame fed, std::shared_ptr<const Map
 
   const Stopwatch wall;
   const double cpu_before = thread_cpu_seconds();
-  ImageU8 color = undistorter_ ? undistorter_->color(frame.color) : std::move(frame.color);
-  ImageU16 depth = undistorter_ && !frame.depth.empty() ? undistorter_->depth(frame.depth) : std::move(frame.depth);
-  const auto features = builder_.build(frame.id, frame.timestamp_ns, to_grey(color), depth);
+  const ImageU8 color = rectifier_.color(std::move(frame.color));
+  ImageU16 depth = rectifier_.depth(std::move(frame.depth));
+  const ImageU8 right = rectifier_.right(std::move(frame.right));
+  const auto features =
+      builder_.build(frame.id, frame.timestamp_ns, to_grey(color), depth, right.empty() ? right : to_grey(right));
   const bool may_become_keyframe = keyframes_allowed && !outcome.held_out && is_mapped(frame);
   TrackingResult result = tracker_.track(features, std::move(map), may_become_keyframe);
   outcome.tracking_ms = wall.milliseconds();

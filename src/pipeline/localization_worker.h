@@ -5,10 +5,10 @@
 #include <memory>
 #include <optional>
 
-#include "image/undistort.h"
 #include "localization/feature_frame_builder.h"
 #include "localization/tracker.h"
 #include "pipeline/frame_feed.h"
+#include "pipeline/frame_rectifier.h"
 #include "pipeline/system_options.h"
 
 namespace photoslam {
@@ -19,15 +19,15 @@ struct NewKeyframe {
   std::shared_ptr<const KeyframeImages> images;
 };
 
-/// Everything that happens to a frame before mapping: undistortion, features, tracking, and bookkeeping of times.
+/// Everything that happens to a frame before mapping: rectification, features, tracking, and bookkeeping of times.
 class LocalizationWorker {
  public:
   LocalizationWorker(const SystemOptions& options, const RunSettings& settings, const SourceInfo& info);
 
-  const PinholeCamera& camera() const { return camera_; }
+  const PinholeCamera& camera() const { return rectifier_.camera(); }
   double bf() const { return builder_.bf(); }
   /// Pixels with data; empty when all have.
-  ImageU8 mask() const { return undistorter_ ? undistorter_->mask() : ImageU8{}; }
+  ImageU8 mask() const { return rectifier_.mask(); }
 
   /// `keyframes_allowed` is false while mapping cannot take another one.
   FrameOutcome process(FedFrame fed, std::shared_ptr<const MapSnapshot> map, bool keyframes_allowed,
@@ -37,9 +37,7 @@ class LocalizationWorker {
   bool is_mapped(const Frame& frame);
 
   RunSettings settings_;
-  SourceInfo info_;
-  PinholeCamera camera_;
-  std::optional<Undistorter> undistorter_;
+  FrameRectifier rectifier_;
   FeatureFrameBuilder builder_;
   Tracker tracker_;
   std::optional<int64_t> first_ns_;

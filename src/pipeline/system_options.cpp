@@ -20,6 +20,7 @@ void PipelineOptions::visit(OptionVisitor& v) {
 void SystemOptions::visit(OptionVisitor& v) {
   v.group("features", "ORB features.", features);
   v.group("depth", "Measured depth, as tracking uses it.", depth);
+  v.group("stereo", "Depth from a second camera.", stereo);
   v.group("localization", "Camera tracking.", localization);
   v.group("geometry_mapping", "Landmarks, keyframes and local bundle adjustment.", geometry_mapping);
   v.group("photorealistic_mapping", "The gaussians.", photorealistic_mapping);

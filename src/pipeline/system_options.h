@@ -24,6 +24,7 @@ struct PipelineOptions {
 struct SystemOptions {
   OrbOptions features;
   DepthOptions depth;
+  StereoOptions stereo;
   TrackerOptions localization;
   GeometryMapperOptions geometry_mapping;
   PhotorealisticOptions photorealistic_mapping;

@@ -12,15 +12,23 @@
 
 namespace photoslam::testing {
 
-/// A small RGB-D camera that walks past the corner of a room with painted walls: exact images, depths and poses, made
-/// in milliseconds.
+/// A small camera that walks past the corner of a room with painted walls: exact images, depths and poses, made in
+/// milliseconds. The stereo cameras have lenses and squint at each other.
 class CornerSource final : public FrameSource {
  public:
-  explicit CornerSource(int num_frames, int width = 240, int height = 180) : num_frames_(num_frames) {
+  explicit CornerSource(int num_frames, int width = 240, int height = 180, SensorKind sensor = SensorKind::rgbd)
+      : num_frames_(num_frames) {
     info_.name = "painted corner";
     info_.format = "test";
     info_.camera = {width, height, 0.85 * width, 0.85 * width, 0.51 * width, 0.49 * height};
-    info_.metres_per_depth_unit = 0.0002;
+    info_.sensor = sensor;
+    if (sensor == SensorKind::rgbd) info_.metres_per_depth_unit = kMetresPerUnit;
+    if (sensor == SensorKind::stereo) {
+      info_.distortion = {.k1 = -0.2, .k2 = 0.05, .p1 = 1e-3};
+      info_.right = RightCamera{
+          info_.camera, {.k1 = -0.21, .k2 = 0.04}, SE3(so3_exp(Vec3(0.01, -0.02, 0.015)), Vec3(-0.1, 0.002, 0.001))};
+      info_.right->camera.fx += 3;
+    }
     info_.frames_per_second = 30;
     info_.num_frames = num_frames;
     Random random(7);
@@ -53,6 +61,7 @@ class CornerSource final : public FrameSource {
 
  private:
   static constexpr int kTexture = 64;
+  static constexpr double kMetresPerUnit = 0.0002;
 
   float texel(int x, int y, int c) const {
     const auto wrap = [](int i) { return ((i % kTexture) + kTexture) % kTexture; };
@@ -73,13 +82,24 @@ class CornerSource final : public FrameSource {
   }
 
   Frame draw(int index) const {
-    const PinholeCamera& camera = info_.camera;
-    const SE3 world_from_camera = camera_from_world(index).inverse();
+    const SE3 camera_from_world = CornerSource::camera_from_world(index);
     Frame frame;
     frame.id = FrameId(index);
     frame.timestamp_ns = static_cast<int64_t>(index) * 1'000'000'000 / 30;
-    frame.color = ImageU8(camera.width, camera.height, 3);
-    frame.depth = ImageU16(camera.width, camera.height);
+    frame.color = paint_view(info_.camera, info_.distortion, camera_from_world,
+                             info_.sensor == SensorKind::rgbd ? &frame.depth : nullptr);
+    if (info_.right) {
+      frame.right = paint_view(info_.right->camera, info_.right->distortion,
+                               info_.right->right_from_left * camera_from_world, nullptr);
+    }
+    return frame;
+  }
+
+  ImageU8 paint_view(const PinholeCamera& camera, const Distortion& lens, const SE3& camera_from_world,
+                     ImageU16* depth) const {
+    const SE3 world_from_camera = camera_from_world.inverse();
+    ImageU8 image(camera.width, camera.height, 3);
+    if (depth != nullptr) *depth = ImageU16(camera.width, camera.height);
     // Walls: z = 3, x = 1.5, x = −1.5; floor and ceiling y = ±1.2.
     const struct {
       int axis;
@@ -87,7 +107,9 @@ class CornerSource final : public FrameSource {
     } walls[] = {{2, 3.0}, {0, 1.5}, {0, -1.5}, {1, 1.2}, {1, -1.2}};
     for (int y = 0; y < camera.height; ++y) {
       for (int x = 0; x < camera.width; ++x) {
-        const Vec3 ray = world_from_camera.rotation * camera.unproject(Vec2(x, y), 1.0);
+        const Vec2 bent = camera.unproject(Vec2(x, y), 1.0).head<2>();
+        const Vec2 straight = undistort(lens, bent).value();
+        const Vec3 ray = world_from_camera.rotation * Vec3(straight.x(), straight.y(), 1.0);
         double z = std::numeric_limits<double>::max();
         int axis = 0;
         for (const auto& wall : walls) {
@@ -100,12 +122,12 @@ class CornerSource final : public FrameSource {
         const Vec3 hit = world_from_camera.translation + z * ray;
         for (int c = 0; c < 3; ++c) {
           const float value = paint(hit[(axis + 1) % 3] + 0.37 * axis, hit[(axis + 2) % 3], c);
-          frame.color(x, y, c) = static_cast<uint8_t>(std::lround(255.0f * value));
+          image(x, y, c) = static_cast<uint8_t>(std::lround(255.0f * value));
         }
-        frame.depth(x, y) = static_cast<uint16_t>(std::lround(z / info_.metres_per_depth_unit));
+        if (depth != nullptr) (*depth)(x, y) = static_cast<uint16_t>(std::lround(z / kMetresPerUnit));
       }
     }
-    return frame;
+    return image;
   }
 
   int num_frames_;
