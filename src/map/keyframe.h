@@ -29,6 +29,7 @@ struct FeatureFrame {
 struct KeyframeImages {
   ImageU8 color;   ///< RGB.
   ImageU16 depth;  ///< Empty without a depth sensor.
+  ImageU8 right;   ///< Grey, from the right camera of a rectified stereo pair; else empty.
 };
 
 /// A selected frame of the map.

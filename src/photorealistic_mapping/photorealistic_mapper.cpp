@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "image/convert.h"
 #include "math/median.h"
 #include "photorealistic_mapping/view_geometry.h"
 
@@ -14,19 +15,15 @@ namespace {
 
 constexpr int kSeedingFactor = 2;  // seeds are made on the half-size image: cheaper, and its noise is lower
 
-/// Inactive features (without a landmark) that have a depth, and landmarks where the map has them.
-std::vector<DepthPixel> feature_seeds(const MapSnapshot& map, const Keyframe& keyframe) {
-  std::vector<DepthPixel> pixels;
-  for (size_t i = 0; i < keyframe.frame->size(); ++i) {
-    const Keypoint& keypoint = keyframe.frame->features.keypoints[i];
-    LandmarkId id = keyframe.landmarks[i];
-    float depth = keyframe.frame->depth[i];
-    if (const LandmarkView* landmark = map.find(id)) {
-      depth = static_cast<float>((keyframe.camera_from_world * landmark->position).z());
-    }
-    if (depth > 0) pixels.push_back({keypoint.x, keypoint.y, depth});
-  }
-  return pixels;
+/// The picture that seeds are made of; without a depth image its depth is empty.
+DepthPicture make_picture(const CameraView& full, double metres_per_depth_unit) {
+  CameraView small = shrink(full, kSeedingFactor);
+  DepthPicture picture{small.camera, std::move(small.color), {}};
+  if (small.depth.empty()) return picture;
+  picture.depth = ImageF(small.camera.width, small.camera.height);
+  std::ranges::transform(small.depth.values(), picture.depth.values().begin(),
+                         [&](uint16_t depth) { return static_cast<float>(depth * metres_per_depth_unit); });
+  return picture;
 }
 
 }  // namespace
@@ -55,20 +52,16 @@ void PhotorealisticOptions::visit(OptionVisitor& v) {
   v.value({"reseed_color_error", "", 0.0, 3.0, "Squared colour error above which old keyframes are seeded again."},
           reseed_color_error);
   v.group("seeding", "Where and how gaussians are born.", seeding);
+  v.group("depth", "Depth of keyframes without a depth sensor.", depth);
+  v.group("feature_depth", "Depth of features without a landmark.", feature_depth);
   v.group("schedule", "Which keyframe is trained, at which resolution.", schedule);
   v.group("rates", "Step sizes of Adam.", rates);
   v.group("densification", "Split, clone and prune.", densification);
   v.group("poses", "Photometric refinement of keyframe poses.", poses);
 }
 
-PhotorealisticMapper::PhotorealisticMapper(const PhotorealisticOptions& options, const PinholeCamera& camera,
-                                           double metres_per_depth_unit, ImageU8 mask, uint64_t seed)
-    : options_(options),
-      camera_(camera),
-      metres_per_depth_unit_(metres_per_depth_unit),
-      mask_(std::move(mask)),
-      random_(seed),
-      schedule_(options.schedule, seed + 1) {
+PhotorealisticMapper::PhotorealisticMapper(const PhotorealisticOptions& options, MapperSensor sensor, uint64_t seed)
+    : options_(options), sensor_(std::move(sensor)), random_(seed), schedule_(options.schedule, seed + 1) {
   model_.set_sh_degree(options.sh_degree);
 }
 
@@ -92,18 +85,54 @@ void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, c
   update_poses(map);
 
   TrainingView& view = views_.emplace_back();
-  const CameraView full{camera_, images.color, images.depth, mask_};
+  const CameraView full{sensor_.camera, images.color, images.depth, sensor_.mask};
   for (int level = 0; level <= options_.schedule.pyramid_levels; ++level) {
     const CameraView small = level == 0 ? full : shrink(full, 1 << level);
     view.cameras.push_back(small.camera);
     splatting::TargetImage& target =
         view.targets.emplace_back(small.camera.width, small.camera.height, small.color.values(), small.mask.values());
-    if (!small.depth.empty()) target.set_depth(small.depth.values(), static_cast<float>(metres_per_depth_unit_));
+    if (!small.depth.empty()) target.set_depth(small.depth.values(), static_cast<float>(sensor_.metres_per_depth_unit));
   }
-  view.seeding_view = shrink(full, kSeedingFactor);
-  const std::vector<DepthPixel> features = feature_seeds(map, keyframe);
-  seed(views_.size() - 1, options_.seeding.cell_px, options_.seeding.min_color_error, features, executor);
+  view.picture = make_picture(full, sensor_.metres_per_depth_unit);
+  if (!images.right.empty()) view.right = shrink_color(images.right, kSeedingFactor);
+  const size_t index = views_.size() - 1;
+  // A single camera's first keyframe has none before it to compare with: it gets its depth from the second.
+  if (index > 0 && views_[index - 1].picture.depth.empty()) seed_keyframe(map, index - 1, executor);
+  seed_keyframe(map, index, executor);
   prune(options_.densification, scene_depth_, model_);
+}
+
+void PhotorealisticMapper::seed_keyframe(const MapSnapshot& map, size_t view, Executor& executor) {
+  DepthPicture& picture = views_[view].picture;
+  if (picture.depth.empty() && options_.depth.enabled) sweep_picture(map, view, executor);
+  const Keyframe& keyframe = map.keyframe(KeyframeId(static_cast<int32_t>(view))).keyframe;
+  const auto features = feature_depths(options_.feature_depth, map, keyframe, picture, kSeedingFactor);
+  seed(view, options_.seeding.cell_px, options_.seeding.min_color_error, features, executor);
+}
+
+void PhotorealisticMapper::sweep_picture(const MapSnapshot& map, size_t index, Executor& executor) {
+  TrainingView& view = views_[index];
+  const KeyframeId id(static_cast<int32_t>(index));
+  const auto range = landmark_depth_range(map, map.keyframe(id).keyframe);
+  if (!range) return;
+  const SE3 world_from_reference = anchors_from_world_[index].inverse();
+  std::vector<SweepView> others;
+  if (!view.right.empty()) {
+    SE3 right_from_left;
+    right_from_left.translation.x() = -sensor_.stereo_baseline_m;
+    others.push_back({&view.right, view.picture.camera, right_from_left});
+  }
+  const auto neighbours = sweep_neighbours(options_.depth, map, id, KeyframeId(static_cast<int32_t>(views_.size())));
+  std::vector<ImageU8> pictures;
+  pictures.reserve(neighbours.size());
+  for (const KeyframeId neighbour : neighbours) {
+    const auto i = static_cast<size_t>(neighbour.value);
+    pictures.push_back(to_grey(views_[i].picture.color));
+    others.push_back({&pictures.back(), view.picture.camera, anchors_from_world_[i] * world_from_reference});
+  }
+  if (others.empty()) return;
+  const ImageU8 grey = to_grey(view.picture.color);
+  view.picture.depth = sweep_depth(options_.depth.sweep, grey, view.picture.camera, others, *range, executor);
 }
 
 SE3 PhotorealisticMapper::view_from_world(size_t view) const {
@@ -119,12 +148,11 @@ splatting::RenderOptions PhotorealisticMapper::render_options() const {
 void PhotorealisticMapper::seed(size_t index, int cell, double min_color_error, std::span<const DepthPixel> features,
                                 Executor& executor) {
   const TrainingView& view = views_[index];
-  const CameraView& small = view.seeding_view;
+  const DepthPicture& picture = view.picture;
   camera_from_anchors(view_from_world(index), anchors_from_world_, camera_from_anchor_);
-  renderer_.render(model_, {to_splatting(small.camera), camera_from_anchor_}, render_options(), executor, render_);
-  auto seeds = seed_cells(options_.seeding, small, metres_per_depth_unit_, render_, std::max(1, cell / kSeedingFactor),
-                          min_color_error);
-  const auto at_features = seed_features(options_.seeding, small, kSeedingFactor, render_, features);
+  renderer_.render(model_, {to_splatting(picture.camera), camera_from_anchor_}, render_options(), executor, render_);
+  auto seeds = seed_cells(options_.seeding, picture, render_, std::max(1, cell / kSeedingFactor), min_color_error);
+  const auto at_features = seed_features(options_.seeding, picture, kSeedingFactor, render_, features);
   seeds.insert(seeds.end(), at_features.begin(), at_features.end());
   const auto limit = static_cast<size_t>(options_.densification.max_gaussians);
   seeds.resize(std::min(seeds.size(), limit - std::min(limit, model_.size())));

@@ -8,8 +8,11 @@
 
 #include "base/executor.h"
 #include "base/options.h"
+#include "image/pyramid.h"
 #include "map/snapshot.h"
 #include "photorealistic_mapping/densification.h"
+#include "photorealistic_mapping/feature_depth.h"
+#include "photorealistic_mapping/keyframe_depth.h"
 #include "photorealistic_mapping/keyframe_schedule.h"
 #include "photorealistic_mapping/pose_adjustment.h"
 #include "photorealistic_mapping/seeding.h"
@@ -37,11 +40,21 @@ struct PhotorealisticOptions {
   int reseed_interval = 25;
   double reseed_color_error = 0.03;
   SeedingOptions seeding;
+  KeyframeDepthOptions depth;
+  FeatureDepthOptions feature_depth;
   ScheduleOptions schedule;
   LearningRateOptions rates;
   DensificationOptions densification;
   PoseAdjustmentOptions poses;
   void visit(OptionVisitor& visitor);
+};
+
+/// What the mapper knows of the camera.
+struct MapperSensor {
+  PinholeCamera camera;
+  double metres_per_depth_unit = 0.001;  ///< Of depth images.
+  double stereo_baseline_m = 0;          ///< Of rectified pairs; 0 = there is no right camera.
+  ImageU8 mask = {};                     ///< 0 where pictures have no data; empty = everywhere.
 };
 
 /// The gaussians and the keyframe poses at one moment: all that rendering needs.
@@ -56,8 +69,7 @@ struct FrozenMap {
 /// a seed, at any concurrency of the executor.
 class PhotorealisticMapper {
  public:
-  PhotorealisticMapper(const PhotorealisticOptions& options, const PinholeCamera& camera, double metres_per_depth_unit,
-                       ImageU8 mask, uint64_t seed);
+  PhotorealisticMapper(const PhotorealisticOptions& options, MapperSensor sensor, uint64_t seed);
 
   /// Takes over the poses of all keyframes.
   void update_poses(const MapSnapshot& map);
@@ -82,19 +94,20 @@ class PhotorealisticMapper {
     PoseAdjustment adjustment;           // photometric correction of the keyframe's pose
     std::vector<PinholeCamera> cameras;  // [levels + 1]
     std::vector<splatting::TargetImage> targets;
-    CameraView seeding_view;  // level 1, with depth
+    DepthPicture picture;  // half the size, for seeding
+    ImageU8 right;         // stereo: grey, half the size
   };
 
   SE3 view_from_world(size_t view) const;
   splatting::RenderOptions render_options() const;
   splatting::TrainOptions train_options(std::optional<double> progress) const;
+  void seed_keyframe(const MapSnapshot& map, size_t view, Executor& executor);
+  void sweep_picture(const MapSnapshot& map, size_t view, Executor& executor);
   void seed(size_t view, int cell, double min_color_error, std::span<const DepthPixel> features, Executor& executor);
   void maintain(std::optional<double> progress, Executor& executor);
 
   PhotorealisticOptions options_;
-  PinholeCamera camera_;
-  double metres_per_depth_unit_;
-  ImageU8 mask_;
+  MapperSensor sensor_;
   Random random_;
   KeyframeSchedule schedule_;
   splatting::GaussianModel model_;

@@ -39,8 +39,8 @@ Vec3 pixel_color(const ImageU8& image, int x, int y) {
   return Vec3(image(x, y, 0), image(x, y, 1), image(x, y, 2)) / 255.0;
 }
 
-double median_depth(const ImageU16& depth, const Cell& cell, double metres_per_unit) {
-  std::vector<uint16_t> values;
+double median_depth(const ImageF& depth, const Cell& cell) {
+  std::vector<float> values;
   for (int y = cell.y0; y < cell.y1; ++y) {
     for (int x = cell.x0; x < cell.x1; ++x) {
       if (depth(x, y) > 0) values.push_back(depth(x, y));
@@ -48,11 +48,10 @@ double median_depth(const ImageU16& depth, const Cell& cell, double metres_per_u
   }
   const auto pixels = static_cast<size_t>((cell.x1 - cell.x0) * (cell.y1 - cell.y0));
   if (values.empty() || 4 * values.size() < pixels) return 0;
-  return lower_median(values) * metres_per_unit;
+  return static_cast<double>(lower_median(values));
 }
 
-Cell summarize_cell(const CameraView& view, double metres_per_depth_unit, const splatting::RenderResult& render,
-                    int column, int row, int size) {
+Cell summarize_cell(const DepthPicture& view, const splatting::RenderResult& render, int column, int row, int size) {
   Cell cell;
   cell.x0 = column * size;
   cell.y0 = row * size;
@@ -76,7 +75,7 @@ Cell summarize_cell(const CameraView& view, double metres_per_depth_unit, const 
   cell.color_error = (rendered / pixels - cell.color).squaredNorm();
   cell.transmittance = 1.0 - alpha / pixels;
   cell.rendered_depth = alpha > 0.1 * pixels ? depth / alpha : 0;
-  if (!view.depth.empty()) cell.depth = median_depth(view.depth, cell, metres_per_depth_unit);
+  if (!view.depth.empty()) cell.depth = median_depth(view.depth, cell);
   cell.measured = cell.depth > 0;
   return cell;
 }
@@ -172,15 +171,15 @@ void SeedingOptions::visit(OptionVisitor& v) {
           feature_color_error);
 }
 
-std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const CameraView& view,
-                                            double metres_per_depth_unit, const splatting::RenderResult& render,
-                                            int cell_size, double min_color_error) {
+std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const DepthPicture& view,
+                                            const splatting::RenderResult& render, int cell_size,
+                                            double min_color_error) {
   CellGrid grid;
   grid.columns = (view.camera.width + cell_size - 1) / cell_size;
   grid.rows = (view.camera.height + cell_size - 1) / cell_size;
   for (int row = 0; row < grid.rows; ++row) {
     for (int column = 0; column < grid.columns; ++column) {
-      grid.cells.push_back(summarize_cell(view, metres_per_depth_unit, render, column, row, cell_size));
+      grid.cells.push_back(summarize_cell(view, render, column, row, cell_size));
     }
   }
   fill_missing_depth(grid);
@@ -202,7 +201,7 @@ std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const
   return seeds;
 }
 
-std::vector<splatting::Gaussian> seed_features(const SeedingOptions& options, const CameraView& view, int factor,
+std::vector<splatting::Gaussian> seed_features(const SeedingOptions& options, const DepthPicture& view, int factor,
                                                const splatting::RenderResult& render,
                                                std::span<const DepthPixel> features) {
   const size_t plane = static_cast<size_t>(view.camera.width) * static_cast<size_t>(view.camera.height);

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "base/options.h"
-#include "image/image.h"
-#include "image/pyramid.h"
+#include "photorealistic_mapping/depth_picture.h"
+#include "photorealistic_mapping/feature_depth.h"
 #include "splatting/gaussian.h"
 #include "splatting/renderer.h"
 
@@ -27,27 +27,20 @@ struct SeedingOptions {
   void visit(OptionVisitor& visitor);
 };
 
-/// A pixel of the full image with a measured depth [m].
-struct DepthPixel {
-  float x = 0, y = 0;
-  float depth = 0;
-};
-
 /// New gaussians in the frame of the view's camera.
 ///
 /// A cell of the image becomes one gaussian, a disc on the measured surface as large as its cell, where `render` (of
 /// the present map, same camera) does not explain it: mostly transparent, behind the measurement, or of another colour.
 /// Cells without depth take the nearest measured one, and only where the map is transparent.
 ///
-/// `cell` is in pixels of `view`; `metres_per_depth_unit` scales its depth.
-std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const CameraView& view,
-                                            double metres_per_depth_unit, const splatting::RenderResult& render,
-                                            int cell, double min_color_error);
+/// `cell` is in pixels of `view`.
+std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const DepthPicture& view,
+                                            const splatting::RenderResult& render, int cell, double min_color_error);
 
 /// Geometry-based densification (paper, Sec. 3.3.1): gaussians at features, the places of complex texture, as large as
 /// their pixel's footprint, where the render of the present map does not explain the pixel. `view` is the full image
 /// shrunk by `factor`.
-std::vector<splatting::Gaussian> seed_features(const SeedingOptions& options, const CameraView& view, int factor,
+std::vector<splatting::Gaussian> seed_features(const SeedingOptions& options, const DepthPicture& view, int factor,
                                                const splatting::RenderResult& render,
                                                std::span<const DepthPixel> features);
 

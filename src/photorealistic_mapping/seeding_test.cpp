@@ -12,18 +12,17 @@
 namespace photoslam {
 namespace {
 
-constexpr double kUnit = 0.001;
 constexpr int kCell = 4;
 
 /// A view of the plane z = depth + slope x, of one colour, before an empty map.
 struct Scene {
-  CameraView view;
+  DepthPicture view;
   splatting::RenderResult render;
 
   explicit Scene(double depth, double slope = 0) {
     view.camera = {64, 48, 60, 60, 31, 25};
     view.color = ImageU8(64, 48, 3, 0);
-    view.depth = ImageU16(64, 48);
+    view.depth = ImageF(64, 48);
     for (int y = 0; y < 48; ++y) {
       for (int x = 0; x < 64; ++x) {
         view.color(x, y, 0) = 51;
@@ -31,7 +30,7 @@ struct Scene {
         view.color(x, y, 2) = 204;
         // z = depth + slope * X with X = (x - cx) / fx * z
         const double z = depth / (1.0 - slope * (x - view.camera.cx) / view.camera.fx);
-        view.depth(x, y) = static_cast<uint16_t>(std::lround(z / kUnit));
+        view.depth(x, y) = static_cast<float>(z);
       }
     }
     render.width = 64;
@@ -44,7 +43,7 @@ struct Scene {
   void render_exactly() {
     for (size_t i = 0; i < 64 * 48; ++i) {
       render.alpha[i] = 1;
-      render.depth[i] = static_cast<float>(view.depth.values()[i] * kUnit);
+      render.depth[i] = view.depth.values()[i];
       for (size_t c = 0; c < 3; ++c)
         render.rgb[c * 64 * 48 + i] = static_cast<float>(view.color.values()[3 * i + c]) / 255;
     }
@@ -60,7 +59,7 @@ Mat3 axes_of(const splatting::Gaussian& g) {
 TEST(SeedCells, OneDiscPerCellOnTheMeasuredSurface) {
   const SeedingOptions options;
   Scene scene(2.0);
-  const auto seeds = seed_cells(options, scene.view, kUnit, scene.render, kCell, options.min_color_error);
+  const auto seeds = seed_cells(options, scene.view, scene.render, kCell, options.min_color_error);
   ASSERT_EQ(seeds.size(), 16u * 12u);
   for (const auto& g : seeds) {
     EXPECT_NEAR(g.mean[2], 2.0, 1e-6);
@@ -76,7 +75,7 @@ TEST(SeedCells, TiltedSurfacesGetDiscsAlongThem) {
   const SeedingOptions options;
   const double slope = 0.4;
   Scene scene(2.0, slope);
-  const auto seeds = seed_cells(options, scene.view, kUnit, scene.render, kCell, options.min_color_error);
+  const auto seeds = seed_cells(options, scene.view, scene.render, kCell, options.min_color_error);
   const Vec3 normal = Vec3(-slope, 0, 1).normalized();
   int checked = 0;
   for (const auto& g : seeds) {
@@ -93,15 +92,15 @@ TEST(SeedCells, WhatTheMapExplainsIsNotSeeded) {
   const SeedingOptions options;
   Scene scene(2.0);
   scene.render_exactly();
-  EXPECT_TRUE(seed_cells(options, scene.view, kUnit, scene.render, kCell, options.min_color_error).empty());
+  EXPECT_TRUE(seed_cells(options, scene.view, scene.render, kCell, options.min_color_error).empty());
   // A block of another colour, and one that stands in front of the rendered surface.
   for (int y = 8; y < 12; ++y) {
     for (int x = 8; x < 12; ++x) {
       for (int c = 0; c < 3; ++c) scene.view.color(x, y, c) = 255;
-      scene.view.depth(x + 16, y) = 1500;
+      scene.view.depth(x + 16, y) = 1.5f;
     }
   }
-  const auto seeds = seed_cells(options, scene.view, kUnit, scene.render, kCell, options.min_color_error);
+  const auto seeds = seed_cells(options, scene.view, scene.render, kCell, options.min_color_error);
   ASSERT_EQ(seeds.size(), 2u);
   EXPECT_NEAR(seeds[0].mean[2], 2.0, 1e-6);
   EXPECT_NEAR(seeds[1].mean[2], 1.5, 1e-6);
@@ -113,16 +112,16 @@ TEST(SeedCells, HolesTakeTheNearestDepthOnlyWhereNothingIsDrawn) {
   for (int y = 0; y < 48; ++y) {
     for (int x = 0; x < 32; ++x) scene.view.depth(x, y) = 0;
   }
-  EXPECT_EQ(seed_cells(options, scene.view, kUnit, scene.render, kCell, options.min_color_error).size(), 16u * 12u);
+  EXPECT_EQ(seed_cells(options, scene.view, scene.render, kCell, options.min_color_error).size(), 16u * 12u);
   scene.render_exactly();
   std::ranges::fill(scene.render.rgb, 0.0f);  // wrong colour everywhere
-  EXPECT_EQ(seed_cells(options, scene.view, kUnit, scene.render, kCell, options.min_color_error).size(), 8u * 12u);
+  EXPECT_EQ(seed_cells(options, scene.view, scene.render, kCell, options.min_color_error).size(), 8u * 12u);
 }
 
 TEST(SeedCells, WithoutAnyDepthThereIsNothingToSeed) {
   Scene scene(2.0);
-  scene.view.depth = ImageU16(64, 48);
-  EXPECT_TRUE(seed_cells({}, scene.view, kUnit, scene.render, kCell, 0.1).empty());
+  scene.view.depth = ImageF(64, 48);
+  EXPECT_TRUE(seed_cells({}, scene.view, scene.render, kCell, 0.1).empty());
 }
 
 TEST(SeedFeatures, OnlyPixelsThatLookWrongGetOne) {

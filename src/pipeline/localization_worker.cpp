@@ -22,9 +22,14 @@ double milliseconds(SteadyTime from, SteadyTime to) {
 LocalizationWorker::LocalizationWorker(const SystemOptions& options, const RunSettings& settings,
                                        const SourceInfo& info)
     : settings_(settings),
+      metres_per_depth_unit_(info.metres_per_depth_unit),
       rectifier_(info),
       builder_(options.features, options.depth, options.stereo, camera(), depth_sensor(info, rectifier_.baseline_m())),
       tracker_(options.localization, options.features, camera(), builder_.bf()) {}
+
+MapperSensor LocalizationWorker::sensor() const {
+  return {camera(), metres_per_depth_unit_, rectifier_.baseline_m(), rectifier_.mask()};
+}
 
 bool LocalizationWorker::is_mapped(const Frame& frame) {
   if (!first_ns_) first_ns_ = frame.timestamp_ns;
@@ -48,9 +53,9 @@ FrameOutcome LocalizationWorker::process(FedFrame fed, std::shared_ptr<const Map
   const double cpu_before = thread_cpu_seconds();
   const ImageU8 color = rectifier_.color(std::move(frame.color));
   ImageU16 depth = rectifier_.depth(std::move(frame.depth));
-  const ImageU8 right = rectifier_.right(std::move(frame.right));
-  const auto features =
-      builder_.build(frame.id, frame.timestamp_ns, to_grey(color), depth, right.empty() ? right : to_grey(right));
+  ImageU8 right = rectifier_.right(std::move(frame.right));
+  if (!right.empty()) right = to_grey(right);
+  const auto features = builder_.build(frame.id, frame.timestamp_ns, to_grey(color), depth, right);
   const bool may_become_keyframe = keyframes_allowed && !outcome.held_out && is_mapped(frame);
   TrackingResult result = tracker_.track(features, std::move(map), may_become_keyframe);
   outcome.tracking_ms = wall.milliseconds();
@@ -69,7 +74,7 @@ FrameOutcome LocalizationWorker::process(FedFrame fed, std::shared_ptr<const Map
   outcome.camera_from_reference = result.camera_from_reference;
   if (result.keyframe) {
     outcome.keyframe = result.keyframe->id;
-    auto images = std::make_shared<KeyframeImages>(KeyframeImages{to_rgb(color), std::move(depth)});
+    auto images = std::make_shared<KeyframeImages>(KeyframeImages{to_rgb(color), std::move(depth), std::move(right)});
     keyframe = NewKeyframe{std::move(*result.keyframe), std::move(images)};
   }
   return outcome;

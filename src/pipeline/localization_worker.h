@@ -26,8 +26,8 @@ class LocalizationWorker {
 
   const PinholeCamera& camera() const { return rectifier_.camera(); }
   double bf() const { return builder_.bf(); }
-  /// Pixels with data; empty when all have.
-  ImageU8 mask() const { return rectifier_.mask(); }
+  /// What mapping needs to know of the rectified camera.
+  MapperSensor sensor() const;
 
   /// `keyframes_allowed` is false while mapping cannot take another one.
   FrameOutcome process(FedFrame fed, std::shared_ptr<const MapSnapshot> map, bool keyframes_allowed,
@@ -37,6 +37,7 @@ class LocalizationWorker {
   bool is_mapped(const Frame& frame);
 
   RunSettings settings_;
+  double metres_per_depth_unit_;
   FrameRectifier rectifier_;
   FeatureFrameBuilder builder_;
   Tracker tracker_;

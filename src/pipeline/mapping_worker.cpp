@@ -6,10 +6,9 @@
 
 namespace photoslam {
 
-MappingWorker::MappingWorker(const SystemOptions& options, const RunSettings& settings, const PinholeCamera& camera,
-                             double metres_per_depth_unit, ImageU8 mask, Executor& executor)
-    : mapper_(options.photorealistic_mapping, camera, metres_per_depth_unit, std::move(mask), settings.seed),
-      executor_(executor) {}
+MappingWorker::MappingWorker(const SystemOptions& options, const RunSettings& settings, MapperSensor sensor,
+                             Executor& executor)
+    : mapper_(options.photorealistic_mapping, std::move(sensor), settings.seed), executor_(executor) {}
 
 void MappingWorker::freeze_if_due() {
   if (online_ || std::chrono::steady_clock::now().time_since_epoch().count() < freeze_time_) return;

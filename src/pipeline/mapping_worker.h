@@ -28,8 +28,7 @@ struct MappingMessage {
 /// figures that others may read at any time.
 class MappingWorker {
  public:
-  MappingWorker(const SystemOptions& options, const RunSettings& settings, const PinholeCamera& camera,
-                double metres_per_depth_unit, ImageU8 mask, Executor& executor);
+  MappingWorker(const SystemOptions& options, const RunSettings& settings, MapperSensor sensor, Executor& executor);
 
   void handle(MappingMessage message);
   /// Trains once; false when there is nothing to train on.

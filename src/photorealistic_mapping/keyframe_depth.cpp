@@ -1,0 +1,49 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "photorealistic_mapping/keyframe_depth.h"
+
+#include <algorithm>
+
+namespace photoslam {
+
+void KeyframeDepthOptions::visit(OptionVisitor& v) {
+  v.value({"enabled", "", 0, 0, "Measure depth by comparing pictures where no sensor does."}, enabled);
+  v.value({"neighbours", "", 0, 16, "Earlier keyframes to compare with, besides the right image of a stereo rig."},
+          neighbours);
+  v.value({"min_parallax", "", 0.0, 1.0, "Nearer keyframes measure too little: distance over median depth."},
+          min_parallax);
+  v.value({"max_parallax", "", 0.0, 10.0, "Farther keyframes look too different."}, max_parallax);
+  v.group("sweep", "The plane sweep.", sweep);
+}
+
+std::optional<DepthRange> landmark_depth_range(const MapSnapshot& map, const Keyframe& keyframe) {
+  constexpr size_t kMinLandmarks = 20;
+  std::vector<double> depths;
+  for (LandmarkId id : keyframe.landmarks) {
+    const LandmarkView* landmark = map.find(id);
+    if (landmark == nullptr) continue;
+    const double depth = (keyframe.camera_from_world * landmark->position).z();
+    if (depth > 0) depths.push_back(depth);
+  }
+  if (depths.size() < kMinLandmarks) return std::nullopt;
+  std::ranges::sort(depths);
+  // Landmarks lie where there is texture; surfaces between them may be somewhat nearer, and much farther.
+  return DepthRange{0.6 * depths[depths.size() / 50], 4.0 * depths[depths.size() - 1 - depths.size() / 50]};
+}
+
+std::vector<KeyframeId> sweep_neighbours(const KeyframeDepthOptions& options, const MapSnapshot& map, KeyframeId id,
+                                         KeyframeId end) {
+  const KeyframeView& view = map.keyframe(id);
+  std::vector<KeyframeId> chosen;
+  for (const CovisibleKeyframe& candidate : view.covisible) {
+    if (static_cast<int>(chosen.size()) >= options.neighbours) break;
+    if (!(candidate.keyframe < end)) continue;
+    const SE3 other_from_this =
+        map.keyframe(candidate.keyframe).keyframe.camera_from_world * view.keyframe.camera_from_world.inverse();
+    const double parallax = other_from_this.translation.norm() / std::max(view.median_depth, 1e-9);
+    if (parallax >= options.min_parallax && parallax <= options.max_parallax) chosen.push_back(candidate.keyframe);
+  }
+  return chosen;
+}
+
+}  // namespace photoslam

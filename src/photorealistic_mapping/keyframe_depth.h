@@ -1,0 +1,32 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "base/options.h"
+#include "geometry/depth_sweep.h"
+#include "map/snapshot.h"
+
+namespace photoslam {
+
+struct KeyframeDepthOptions {
+  bool enabled = true;
+  int neighbours = 2;
+  double min_parallax = 0.02;
+  double max_parallax = 0.30;
+  DepthSweepOptions sweep;
+  void visit(OptionVisitor& visitor);
+};
+
+/// Depths in which a keyframe's picture is searched, from those of its landmarks; nothing when it has too few.
+std::optional<DepthRange> landmark_depth_range(const MapSnapshot& map, const Keyframe& keyframe);
+
+/// Covisible keyframes from whose pictures depth can be swept: seen from the scene's median depth they are far enough
+/// apart to measure and near enough to match; the most covisible first, at most `options.neighbours`, only those before
+/// `end`.
+std::vector<KeyframeId> sweep_neighbours(const KeyframeDepthOptions& options, const MapSnapshot& map, KeyframeId id,
+                                         KeyframeId end);
+
+}  // namespace photoslam

@@ -1,0 +1,141 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "photorealistic_mapping/photorealistic_mapper.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "geometry/testing/textured_wall.h"
+#include "image/convert.h"
+#include "map/map.h"
+
+namespace photoslam {
+namespace {
+
+constexpr PinholeCamera kCamera = {320, 240, 280, 280, 166.5, 114};
+constexpr double kBaseline = 0.2;
+
+SE3 at(double x, double y = 0) { return {Quat::Identity(), Vec3(-x, -y, 0)}; }
+
+/// Keyframes before a textured wall, with landmarks at exact positions, as geometry mapping would deliver them.
+class WallWithKeyframes {
+ public:
+  void add(const SE3& camera_from_world) {
+    const KeyframeId id(static_cast<int32_t>(map_.num_keyframes()));
+    auto frame = std::make_shared<FeatureFrame>();
+    std::vector<Vec3> points;
+    for (int y = 20; y < kCamera.height - 20; y += 20) {
+      for (int x = 20; x < kCamera.width - 20; x += 20) {
+        Keypoint keypoint;
+        keypoint.x = static_cast<float>(x);
+        keypoint.y = static_cast<float>(y);
+        frame->features.keypoints.push_back(keypoint);
+        frame->features.descriptors.push_back({});
+        frame->observations.push_back({.pixel = Vec2(x, y)});
+        const double depth = wall.look(kCamera, camera_from_world, x, y).depth;
+        points.push_back(camera_from_world.inverse() * kCamera.unproject(Vec2(x, y), depth));
+      }
+    }
+    frame->depth.assign(points.size(), 0.0f);
+    map_.add_keyframe(id, frame, camera_from_world);
+    // Each keyframe sees its own landmarks and half of those of the one before, so that they are covisible.
+    for (size_t i = 0; i < points.size(); ++i) {
+      const bool shared = id.value > 0 && i % 2 == 0;
+      const LandmarkId landmark = shared ? LandmarkId(static_cast<int32_t>(i)) : LandmarkId();
+      if (shared && map_.add_observation(landmark, id, static_cast<int>(i))) {
+        map_.set_position(landmark, points[i]);
+      } else {
+        map_.update_view(map_.add_landmark(points[i], id, static_cast<int>(i)));
+      }
+    }
+  }
+  std::shared_ptr<const MapSnapshot> snapshot() { return map_.snapshot(); }
+  ImageU8 picture(const SE3& camera_from_world) const { return wall.picture(kCamera, camera_from_world); }
+
+  photoslam::testing::TexturedWall wall;
+
+ private:
+  Map map_{1.2, 8};
+};
+
+class PhotorealisticMapperTest : public ::testing::Test {
+ protected:
+  void add(PhotorealisticMapper& mapper, const SE3& pose, KeyframeImages images) {
+    world_.add(pose);
+    images.color = to_rgb(world_.picture(pose));
+    mapper.add_keyframe(*world_.snapshot(), KeyframeId(count_++), images, executor_);
+  }
+  /// Share of the gaussians within `tolerance` of the wall's depth, seen from the first keyframe.
+  double share_on_the_wall(const PhotorealisticMapper& mapper, double tolerance) const {
+    const FrozenMap map = mapper.freeze();
+    int near = 0, all = 0;
+    map.gaussians.for_each([&](size_t i) {
+      const splatting::Gaussian g = map.gaussians.get(i);
+      const Vec3 mean(static_cast<double>(g.mean[0]), static_cast<double>(g.mean[1]), static_cast<double>(g.mean[2]));
+      const Vec3 p = map.anchors_from_world[static_cast<size_t>(map.gaussians.anchor(i))].inverse() * mean;
+      const double wall = 4.0 + world_.wall.wall_slope * p.x();
+      near += std::abs(p.z() - wall) < tolerance * wall;
+      ++all;
+    });
+    return static_cast<double>(near) / std::max(all, 1);
+  }
+  KeyframeImages stereo(const SE3& pose) const {
+    SE3 right_from_left;
+    right_from_left.translation.x() = -kBaseline;
+    return {{}, {}, world_.picture(right_from_left * pose)};
+  }
+
+  WallWithKeyframes world_;
+  ThreadPool executor_{2};
+  int32_t count_ = 0;
+};
+
+TEST_F(PhotorealisticMapperTest, StereoSeedsTheSurfaceFromOneKeyframe) {
+  PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
+  add(mapper, at(0), stereo(at(0)));
+  EXPECT_GT(mapper.gaussians().size(), 800u) << "one per cell of 8 pixels";
+  EXPECT_GT(share_on_the_wall(mapper, 0.08), 0.9);
+}
+
+TEST_F(PhotorealisticMapperTest, ASingleCameraSeedsBothKeyframesFromTheSecondOn) {
+  PhotorealisticMapper mapper({}, {.camera = kCamera}, 1);
+  add(mapper, at(0), {});
+  const size_t at_features = mapper.gaussians().size();
+  EXPECT_LT(at_features, 200u) << "features only: nothing to compare the picture with";
+  add(mapper, at(0.3, 0.05), {});
+  EXPECT_GT(mapper.gaussians().size(), 800u);
+  EXPECT_GT(share_on_the_wall(mapper, 0.08), 0.9);
+}
+
+TEST_F(PhotorealisticMapperTest, TrainingImprovesTheRender) {
+  PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
+  for (const double x : {0.0, 0.3, 0.6}) add(mapper, at(x), stereo(at(x)));
+  const auto first = mapper.train({}, executor_);
+  splatting::StepResult last{};
+  for (int i = 0; i < 150; ++i) last = mapper.train({}, executor_);
+  EXPECT_LT(last.mse, 0.5f * first.mse);
+  EXPECT_EQ(mapper.num_iterations(), 151);
+}
+
+TEST_F(PhotorealisticMapperTest, GaussiansFollowTheirKeyframe) {
+  PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
+  add(mapper, at(0), stereo(at(0)));
+  const FrozenMap before = mapper.freeze();
+  MapSnapshot corrected = *world_.snapshot();
+  auto moved = std::make_shared<KeyframeView>(corrected.keyframe(KeyframeId(0)));
+  moved->keyframe.camera_from_world = SE3(so3_exp(Vec3(0.1, -0.2, 0.3)), Vec3(1, 2, 3));
+  corrected.keyframes[0] = moved;
+  mapper.update_poses(corrected);
+  const FrozenMap after = mapper.freeze();
+  // What the keyframe's camera sees is untouched: the gaussians have not changed in its frame, only the frame moved.
+  EXPECT_EQ(after.anchors_from_world[0].translation, Vec3(1, 2, 3));
+  ASSERT_EQ(after.gaussians.size(), before.gaussians.size());
+  after.gaussians.for_each([&](size_t i) {
+    const splatting::Gaussian a = after.gaussians.get(i), b = before.gaussians.get(i);
+    for (int k = 0; k < 3; ++k) ASSERT_EQ(a.mean[k], b.mean[k]);
+  });
+}
+
+}  // namespace
+}  // namespace photoslam
