@@ -72,7 +72,7 @@ std::optional<AbsoluteError> absolute_error(const Trajectory& estimate, const Tr
   for (size_t k = 0; k < pairs.size(); ++k) {
     distances.push_back((result.truth_from_estimate * source[k] - target[k]).norm());
     const Quat aligned_rotation =
-        result.truth_from_estimate.rigid.rotation * estimate[pairs[k].first].world_from_camera.rotation;
+        result.truth_from_estimate.rotation * estimate[pairs[k].first].world_from_camera.rotation;
     angles.push_back(degrees(truth[pairs[k].second].world_from_camera.rotation.conjugate() * aligned_rotation));
   }
   result.rmse_m = root_mean_square(distances);
@@ -107,11 +107,11 @@ std::optional<RelativeError> relative_error(const Trajectory& estimate, const Tr
   return RelativeError{root_mean_square(distances), root_mean_square(angles), distances.size()};
 }
 
-Trajectory aligned(const Trajectory& estimate, const Similarity& truth_from_estimate) {
+Trajectory aligned(const Trajectory& estimate, const Sim3& truth_from_estimate) {
   Trajectory result = estimate;
   for (StampedPose& pose : result) {
     SE3& world_from_camera = pose.world_from_camera;
-    world_from_camera = SE3(truth_from_estimate.rigid.rotation * world_from_camera.rotation,
+    world_from_camera = SE3(truth_from_estimate.rotation * world_from_camera.rotation,
                             truth_from_estimate * world_from_camera.translation);
   }
   return result;

@@ -22,10 +22,10 @@ struct AbsoluteError {
   double rmse_m = 0;
   double std_m = 0;
   double median_m = 0;
-  double rot_rmse_deg = 0;         ///< Angle between the aligned and the true orientation.
-  double scale = 1;                ///< Of the alignment; 1 unless asked for.
-  size_t matched = 0;              ///< Pairs of poses compared.
-  Similarity truth_from_estimate;  ///< The alignment of the worlds.
+  double rot_rmse_deg = 0;   ///< Angle between the aligned and the true orientation.
+  double scale = 1;          ///< Of the alignment; 1 unless asked for.
+  size_t matched = 0;        ///< Pairs of poses compared.
+  Sim3 truth_from_estimate;  ///< The alignment of the worlds.
 };
 
 /// Nothing when fewer than three poses match.
@@ -44,6 +44,6 @@ std::optional<RelativeError> relative_error(const Trajectory& estimate, const Tr
                                             double seconds = 1);
 
 /// The estimate in the world of the truth.
-Trajectory aligned(const Trajectory& estimate, const Similarity& truth_from_estimate);
+Trajectory aligned(const Trajectory& estimate, const Sim3& truth_from_estimate);
 
 }  // namespace photoslam

@@ -8,7 +8,7 @@
 
 namespace photoslam {
 
-Similarity align_umeyama(std::span<const Vec3> source, std::span<const Vec3> target, bool with_scale) {
+Sim3 align_umeyama(std::span<const Vec3> source, std::span<const Vec3> target, bool with_scale) {
   PHOTOSLAM_CHECK(source.size() == target.size() && !source.empty(), "{} source, {} target points", source.size(),
                   target.size());
   const auto count = static_cast<double>(source.size());
@@ -27,10 +27,10 @@ Similarity align_umeyama(std::span<const Vec3> source, std::span<const Vec3> tar
   // The best orthogonal matrix may be a reflection; flipping the weakest axis makes it the best rotation.
   Vec3 sign(1, 1, svd.matrixU().determinant() * svd.matrixV().determinant() < 0 ? -1 : 1);
   const Mat3 rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-  Similarity result;
+  Sim3 result;
   if (with_scale && source_variance > 0) result.scale = svd.singularValues().dot(sign) / source_variance;
-  result.rigid.rotation = Quat(rotation).normalized();
-  result.rigid.translation = target_mean - result.rigid.rotation * (result.scale * source_mean);
+  result.rotation = Quat(rotation).normalized();
+  result.translation = target_mean - result.rotation * (result.scale * source_mean);
   return result;
 }
 

@@ -4,20 +4,13 @@
 
 #include <span>
 
-#include "math/se3.h"
+#include "math/sim3.h"
 
 namespace photoslam {
-
-/// Similarity named `b_from_a`: x_b = s R x_a + t.
-struct Similarity {
-  double scale = 1.0;
-  SE3 rigid;
-  Vec3 operator*(const Vec3& x) const { return rigid.rotation * (scale * x) + rigid.translation; }
-};
 
 /// The similarity that maps `source` onto `target`, index by index, with the least sum of squared distances (Umeyama
 /// 1991). Without scale the best rigid transform. At least one point; where the points leave a rotation undetermined
 /// (fewer than three, or on a line) any best one is returned.
-Similarity align_umeyama(std::span<const Vec3> source, std::span<const Vec3> target, bool with_scale);
+Sim3 align_umeyama(std::span<const Vec3> source, std::span<const Vec3> target, bool with_scale);
 
 }  // namespace photoslam

@@ -21,9 +21,9 @@ std::vector<Vec3> random_points(int count, const Vec3& extent, uint64_t seed) {
   return points;
 }
 
-const Similarity kTruth{1.7, {so3_exp(Vec3(0.4, -1.2, 2.1)), Vec3(3, -5, 0.5)}};
+const Sim3 kTruth{1.7, so3_exp(Vec3(0.4, -1.2, 2.1)), Vec3(3, -5, 0.5)};
 
-double squared_error(const Similarity& s, const std::vector<Vec3>& source, const std::vector<Vec3>& target) {
+double squared_error(const Sim3& s, const std::vector<Vec3>& source, const std::vector<Vec3>& target) {
   double sum = 0;
   for (size_t i = 0; i < source.size(); ++i) sum += (s * source[i] - target[i]).squaredNorm();
   return sum;
@@ -35,9 +35,9 @@ TEST(Umeyama, RecoversASimilarity) {
     const auto source = random_points(20, extent, 1);
     std::vector<Vec3> target;
     for (const Vec3& x : source) target.push_back(kTruth * x);
-    const Similarity found = align_umeyama(source, target, true);
+    const Sim3 found = align_umeyama(source, target, true);
     EXPECT_NEAR(found.scale, kTruth.scale, 1e-12);
-    EXPECT_LT((found.rigid * kTruth.rigid.inverse()).log().norm(), 1e-10);
+    EXPECT_LT((found * kTruth.inverse()).log().norm(), 1e-10);
   }
 }
 
@@ -46,17 +46,12 @@ TEST(Umeyama, NoNearbyTransformIsBetter) {
   std::vector<Vec3> target;
   for (size_t i = 0; i < source.size(); ++i) target.push_back(kTruth * source[i] + noise[i]);
   for (bool with_scale : {true, false}) {
-    const Similarity best = align_umeyama(source, target, with_scale);
+    const Sim3 best = align_umeyama(source, target, with_scale);
     EXPECT_TRUE(with_scale || best.scale == 1.0);
     const double least = squared_error(best, source, target);
     for (int k = 0; k < (with_scale ? 7 : 6); ++k) {
       for (double step : {1e-3, -1e-3}) {
-        Similarity other = best;
-        if (k < 6) {
-          other.rigid = SE3::exp(step * Vec6::Unit(k)) * best.rigid;
-        } else {
-          other.scale += step;
-        }
+        const Sim3 other = Sim3::exp(step * Vec7::Unit(k)) * best;
         EXPECT_GT(squared_error(other, source, target), least) << k;
       }
     }

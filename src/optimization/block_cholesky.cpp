@@ -10,11 +10,12 @@
 namespace photoslam {
 namespace {
 
-using Block = BlockCholesky::Block;
-constexpr int kBlock = BlockCholesky::kBlock;
+template <int kBlock>
+using Block = Eigen::Matrix<double, kBlock, kBlock>;
 
 /// c -= a bᵀ
-void subtract_product(const Block& a, const Block& b, Block& c) {
+template <int kBlock>
+void subtract_product(const Block<kBlock>& a, const Block<kBlock>& b, Block<kBlock>& c) {
   for (int j = 0; j < kBlock; ++j) {
     auto column = c.col(j);
     for (int k = 0; k < kBlock; ++k) column -= b(j, k) * a.col(k);
@@ -22,7 +23,8 @@ void subtract_product(const Block& a, const Block& b, Block& c) {
 }
 
 /// Cholesky factor of the lower triangle, in place; false when not positive definite.
-bool factorize_block(Block& a) {
+template <int kBlock>
+bool factorize_block(Block<kBlock>& a) {
   for (int j = 0; j < kBlock; ++j) {
     double d = a(j, j);
     for (int k = 0; k < j; ++k) d -= a(j, k) * a(j, k);
@@ -39,7 +41,8 @@ bool factorize_block(Block& a) {
 }
 
 /// x ← x L⁻ᵀ for a lower triangular L.
-void solve_right(const Block& lower, Block& x) {
+template <int kBlock>
+void solve_right(const Block<kBlock>& lower, Block<kBlock>& x) {
   for (int j = 0; j < kBlock; ++j) {
     for (int k = 0; k < j; ++k) x.col(j) -= lower(j, k) * x.col(k);
     x.col(j) *= 1.0 / lower(j, j);
@@ -48,7 +51,8 @@ void solve_right(const Block& lower, Block& x) {
 
 }  // namespace
 
-void BlockCholesky::reset(std::span<const int> first_column) {
+template <int kBlock>
+void BlockCholesky<kBlock>::reset(std::span<const int> first_column) {
   first_column_.assign(first_column.begin(), first_column.end());
   row_start_.resize(first_column.size());
   int count = 0;
@@ -61,7 +65,8 @@ void BlockCholesky::reset(std::span<const int> first_column) {
   blocks_.assign(static_cast<size_t>(count), Block::Zero());
 }
 
-bool BlockCholesky::factorize() {
+template <int kBlock>
+bool BlockCholesky<kBlock>::factorize() {
   for (int row = 0; row < size(); ++row) {
     const int first = first_column_[static_cast<size_t>(row)];
     for (int column = first; column <= row; ++column) {
@@ -78,22 +83,26 @@ bool BlockCholesky::factorize() {
   return true;
 }
 
-void BlockCholesky::solve(Eigen::Ref<Eigen::VectorXd> x) const {
+template <int kBlock>
+void BlockCholesky<kBlock>::solve(Eigen::Ref<Eigen::VectorXd> x) const {
   PHOTOSLAM_CHECK(x.size() == kBlock * size(), "{} values, {} blocks", x.size(), size());
   for (int row = 0; row < size(); ++row) {
-    auto part = x.segment<kBlock>(kBlock * row);
+    auto part = x.template segment<kBlock>(kBlock * row);
     for (int column = first_column_[static_cast<size_t>(row)]; column < row; ++column) {
-      part.noalias() -= block(row, column) * x.segment<kBlock>(kBlock * column);
+      part.noalias() -= block(row, column) * x.template segment<kBlock>(kBlock * column);
     }
-    block(row, row).triangularView<Eigen::Lower>().solveInPlace(part);
+    block(row, row).template triangularView<Eigen::Lower>().solveInPlace(part);
   }
   for (int row = size() - 1; row >= 0; --row) {
-    auto part = x.segment<kBlock>(kBlock * row);
-    block(row, row).triangularView<Eigen::Lower>().transpose().solveInPlace(part);
+    auto part = x.template segment<kBlock>(kBlock * row);
+    block(row, row).template triangularView<Eigen::Lower>().transpose().solveInPlace(part);
     for (int column = first_column_[static_cast<size_t>(row)]; column < row; ++column) {
-      x.segment<kBlock>(kBlock * column).noalias() -= block(row, column).transpose() * part;
+      x.template segment<kBlock>(kBlock * column).noalias() -= block(row, column).transpose() * part;
     }
   }
 }
+
+template class BlockCholesky<6>;
+template class BlockCholesky<7>;
 
 }  // namespace photoslam

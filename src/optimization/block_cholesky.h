@@ -8,12 +8,12 @@
 
 namespace photoslam {
 
-/// Symmetric positive definite system of 6x6 blocks, stored and factored as a skyline: of every block row the lower
-/// triangle from its first non-zero block to the diagonal. Camera systems are close to banded when the poses are in
-/// temporal order. Keeps its memory between problems.
+/// Symmetric positive definite system of square blocks (of size 6 or 7), stored and factored as a skyline: of every
+/// block row the lower triangle from its first non-zero block to the diagonal. Camera systems are close to banded when
+/// the poses are in temporal order. Keeps its memory between problems.
+template <int kBlock>
 class BlockCholesky {
  public:
-  static constexpr int kBlock = 6;
   using Block = Eigen::Matrix<double, kBlock, kBlock>;
 
   /// first_column[i] <= i is the first non-zero block of block row i. All blocks become zero.
@@ -28,7 +28,7 @@ class BlockCholesky {
 
   /// Replaces the matrix by its Cholesky factor; false (and undefined content) when it is not positive definite.
   bool factorize();
-  /// Solves in place after factorize(). `x` has 6 size() entries.
+  /// Solves in place after factorize(). `x` has kBlock size() entries.
   void solve(Eigen::Ref<Eigen::VectorXd> x) const;
 
  private:

@@ -12,7 +12,7 @@ namespace photoslam {
 namespace {
 
 using Mat63 = Eigen::Matrix<double, 6, 3>;
-using Block = BlockCholesky::Block;
+using Block = BlockCholesky<6>::Block;
 
 constexpr int kFixed = -1;
 
@@ -64,7 +64,7 @@ struct BundleAdjuster::State {
   // Normal equations: pose blocks, pose-point blocks (the point blocks are in `points`), reduced camera system.
   std::vector<Block> pose_hessian;  // [F] lower triangles
   std::vector<Mat63> coupling;      // [terms]
-  BlockCholesky system;
+  BlockCholesky<6> system;
   Eigen::VectorXd gradient, step;  // [6 F]
 
   std::vector<Mat3> rotations;  // [P] of the poses last evaluated

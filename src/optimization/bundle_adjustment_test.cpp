@@ -25,7 +25,7 @@ TEST(BlockCholesky, SolvesASkylineSystem) {
   const std::vector<int> first_column = {0, 0, 1, 3, 0, 2, 5};
   constexpr int kSize = 42;
   Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(kSize, kSize);
-  BlockCholesky system;
+  BlockCholesky<6> system;
   for (int repetition = 0; repetition < 2; ++repetition) {
     system.reset(first_column);
     dense.setZero();
@@ -46,7 +46,7 @@ TEST(BlockCholesky, SolvesASkylineSystem) {
 }
 
 TEST(BlockCholesky, RefusesAnIndefiniteMatrix) {
-  BlockCholesky system;
+  BlockCholesky<6> system;
   const std::vector<int> first_column = {0, 0};
   system.reset(first_column);
   for (int i = 0; i < 2; ++i) system.block(i, i).setIdentity();
