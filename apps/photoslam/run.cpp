@@ -18,6 +18,7 @@
 #include "result_table.h"
 #include "run_folder.h"
 #include "sources/ground_truth.h"
+#include "sources/sensor_choice.h"
 
 namespace photoslam {
 namespace {
@@ -26,9 +27,8 @@ namespace fs = std::filesystem;
 
 struct RunArguments {
   fs::path dataset;
-  std::string sensor;
-  std::string format = "auto";
-  fs::path camera;
+  std::string sensor = "auto";
+  SourceOptions source;
   fs::path output = "output/run";
   std::string pace = "realtime";
   int iterations_per_frame = -1;
@@ -56,8 +56,9 @@ Status configure(const RunArguments& arguments, SystemOptions& options, RunSetti
 }
 
 void announce(const SourceInfo& info, const RunArguments& arguments) {
-  fmt::print(stderr, "{}: {} frames, {}x{}, {:.4g} Hz, format {}, RGB-D\n", info.name, info.num_frames,
-             info.camera.width, info.camera.height, info.frames_per_second, info.format);
+  fmt::print(stderr, "{}: {} frames, {}x{}, {:.4g} Hz, format {}, sensor {}{}\n", info.name, info.num_frames,
+             info.camera.width, info.camera.height, info.frames_per_second, info.format, sensor_name(info.sensor),
+             arguments.source.sensor ? "" : " (guessed from the data; --sensor tells)");
   for (const std::string& note : info.notes) fmt::print(stderr, "  note: {}\n", note);
   fmt::print(stderr, "writing to {}\n", arguments.output.string());
 }
@@ -65,8 +66,8 @@ void announce(const SourceInfo& info, const RunArguments& arguments) {
 /// Trajectories and map are on disk before anything is measured.
 Status save_and_evaluate(const RunArguments& arguments, const SystemOptions& options, const RunSettings& settings,
                          const SourceInfo& info, const RunOutcome& run) {
-  const RunDescription description{
-      arguments.dataset, {arguments.format, arguments.camera}, FrameRectifier(info).camera(), settings.hold_out};
+  const RunDescription description{arguments.dataset, arguments.source, FrameRectifier(info).camera(),
+                                   settings.hold_out};
   size_t map_bytes = 0;
   if (Status status = write_run_description(arguments.output, description); !status) return status;
   if (Status status = write_run_results(arguments.output, run, map_bytes); !status) return status;
@@ -98,7 +99,7 @@ Status run(const RunArguments& arguments) {
   SystemOptions options;
   RunSettings settings;
   if (Status status = configure(arguments, options, settings); !status) return status;
-  auto source = open_source(arguments.dataset, {arguments.format, arguments.camera});
+  auto source = open_source(arguments.dataset, arguments.source);
   if (!source) return source.error();
   const SourceInfo info = (*source)->info();
   if (Status status = prepare_output_folder(arguments.output); !status) return status;
@@ -129,9 +130,18 @@ void add_run(CommandLine& line) {
                                "  photoslam run my_sequence --deterministic --seed 7 --hold-out 8\n");
   RunArguments& a = *arguments;
   command.add_option("dataset", a.dataset, "Folder of the sequence")->required();
-  command.add_option("--sensor", a.sensor, "Sensor of the sequence: rgbd")->check(CLI::IsMember({"rgbd"}));
-  command.add_option("--format", a.format, "Layout of the sequence")->check(CLI::IsMember({"auto", "tum", "replica"}));
-  command.add_option("--camera", a.camera, "camera.yaml to use instead of the sequence's own calibration");
+  command
+      .add_option("--sensor", a.sensor,
+                  "Sensor of the sequence; auto takes all it has, mono leaves depth or the right "
+                  "images out")
+      ->check(CLI::IsMember({"auto", "mono", "stereo", "rgbd"}))
+      ->capture_default_str();
+  std::vector<std::string> formats = source_formats();
+  formats.insert(formats.begin(), "auto");
+  command.add_option("--format", a.source.format, "Layout of the sequence")
+      ->check(CLI::IsMember(formats))
+      ->capture_default_str();
+  command.add_option("--camera", a.source.camera, "camera.yaml to use instead of the sequence's own calibration");
   command.add_option("--output", a.output, "Folder for the results")->capture_default_str();
   command.add_option("--pace", a.pace, "Release frames at their timestamps, or as fast as they are tracked")
       ->check(CLI::IsMember({"realtime", "asap"}))
@@ -155,7 +165,12 @@ void add_run(CommandLine& line) {
       ->check(CLI::Range(0, 1024));
   a.config.bind(command);
   command.add_flag("--json", a.json, "Print the report as JSON instead of the table");
-  line.on_run(command, [arguments] { return run(*arguments); });
+  line.on_run(command, [arguments]() -> Status {
+    const auto sensor = parse_sensor(arguments->sensor);
+    if (!sensor) return sensor.error();
+    arguments->source.sensor = *sensor;
+    return run(*arguments);
+  });
 }
 
 }  // namespace photoslam

@@ -7,6 +7,7 @@
 #include "base/file.h"
 #include "evaluation/run_evaluation.h"
 #include "io/gaussian_ply.h"
+#include "sources/sensor_choice.h"
 
 namespace photoslam {
 
@@ -17,6 +18,7 @@ Status write_run_description(const fs::path& folder, const RunDescription& descr
   const nlohmann::ordered_json json = {
       {"dataset", fs::absolute(description.dataset).string()},
       {"format", description.source.format},
+      {"sensor", description.source.sensor ? sensor_name(*description.source.sensor) : "auto"},
       {"camera_file", description.source.camera.string()},
       {"camera", {{"width", c.width}, {"height", c.height}, {"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}}},
       {"hold_out", description.hold_out}};
@@ -32,6 +34,9 @@ Result<RunDescription> read_run_description(const fs::path& folder) {
     RunDescription description;
     description.dataset = json.at("dataset").get<std::string>();
     description.source.format = json.at("format").get<std::string>();
+    const auto sensor = parse_sensor(json.value("sensor", "auto"));
+    if (!sensor) return error("{}: {}", path.string(), sensor.error().message);
+    description.source.sensor = *sensor;
     description.source.camera = json.at("camera_file").get<std::string>();
     const auto& camera = json.at("camera");
     description.camera = {camera.at("width"), camera.at("height"), camera.at("fx"),

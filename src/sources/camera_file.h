@@ -19,8 +19,9 @@ struct CameraFile {
   std::optional<double> depth_scale;  ///< Stored depth value / depth_scale = metres.
 };
 
-/// Reads `camera.yaml`: model (pinhole), width, height, fx, fy, cx, cy [px], and optionally distortion (a list of
-/// 4 or 5 coefficients k1, k2, p1, p2, k3, or empty), fps, depth_scale.
+/// Reads `camera.yaml`: width, height, fx, fy, cx, cy [px], and optionally model (pinhole or fisheye), distortion (a
+/// list of 4, 5 or 8 coefficients k1 k2 p1 p2 k3 k4 k5 k6 of a pinhole, of 4 coefficients k1 k2 k3 k4 of a fisheye, or
+/// empty), fps, depth_scale.
 ///
 /// Missing, unknown (with the nearest known one) and senseless values are errors with file and line.
 Result<CameraFile> read_camera_yaml(const std::filesystem::path& path);

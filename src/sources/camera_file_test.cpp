@@ -57,10 +57,10 @@ TEST_F(CameraFileTest, ErrorsNameFileAndLine) {
   EXPECT_THAT(failure("fy: 524", "fy: wide"), HasSubstr("camera.yaml:6: fy is not a number"));
   EXPECT_THAT(failure("fy: 524", "fy: .nan"), HasSubstr("camera.yaml:6: fy is not a number"));
   EXPECT_THAT(failure("fy: 524", "fy: -1"), HasSubstr("camera.yaml:6: fy = -1 lies outside"));
-  EXPECT_THAT(failure("pinhole", "fisheye"), HasSubstr("camera.yaml:2: the only known model is 'pinhole'"));
+  EXPECT_THAT(failure("pinhole", "pinhoel"), HasSubstr("camera.yaml:2: unknown model 'pinhoel'"));
   EXPECT_THAT(failure("[0.1, -0.2, 0.001, 0.002, 0.3]", "[1, 2]"),
-              HasSubstr("camera.yaml:9: distortion must be a list"));
-  EXPECT_THAT(failure("[0.1, -0.2, 0.001, 0.002, 0.3]", "0.1"), HasSubstr("camera.yaml:9: distortion must be a list"));
+              HasSubstr("camera.yaml:9: found 2 distortion coefficients, expected 4, 5 or 8"));
+  EXPECT_THAT(failure("[0.1, -0.2, 0.001, 0.002, 0.3]", "0.1"), HasSubstr("camera.yaml:9: distortion is not a list"));
   EXPECT_THAT(failure("fx: 525.5", "fx: [525.5"), HasSubstr("camera.yaml:"));
   EXPECT_THAT(read_camera_yaml(write("camera.yaml", "fx")).error().message, HasSubstr("expected lines like"));
   EXPECT_THAT(read_camera_yaml(write("camera.yaml", "")).error().message, HasSubstr("expected lines like"));

@@ -42,7 +42,7 @@ TEST_F(GroundTruthTest, ReadsReplica) {
 
 TEST_F(GroundTruthTest, AbsenceIsNoError) {
   EXPECT_FALSE(find_ground_truth(folder).has_value());
-  EXPECT_THAT(read_ground_truth(folder).error().message, HasSubstr("neither groundtruth.txt nor traj.txt"));
+  EXPECT_THAT(read_ground_truth(folder).error().message, HasSubstr("has no true trajectory"));
 }
 
 TEST_F(GroundTruthTest, ErrorsNameTheLine) {

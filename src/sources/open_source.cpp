@@ -5,6 +5,8 @@
 #include <array>
 
 #include "base/nearest_name.h"
+#include "sources/euroc_source.h"
+#include "sources/kitti_source.h"
 #include "sources/replica_source.h"
 #include "sources/tum_source.h"
 
@@ -16,22 +18,25 @@ namespace fs = std::filesystem;
 struct Format {
   std::string name;
   bool (*matches)(const fs::path& folder);
-  Result<std::unique_ptr<FrameSource>> (*open)(const fs::path& folder, const fs::path& camera_file);
+  Result<std::unique_ptr<FrameSource>> (*open)(const fs::path& folder, const SourceOptions& options);
 };
 
-const std::array<Format, 2>& formats() {
-  static const std::array<Format, 2> kFormats = {{
+const std::array<Format, 4>& formats() {
+  static const std::array<Format, 4> kFormats = {{
       {"tum", internal::looks_like_tum, internal::open_tum},
+      {"euroc", internal::looks_like_euroc, internal::open_euroc},
+      {"kitti", internal::looks_like_kitti, internal::open_kitti},
       {"replica", internal::looks_like_replica, internal::open_replica},
   }};
   return kFormats;
 }
 
 Error unknown_format(const std::string& name) {
-  const std::array<std::string, 3> names = {"auto", "tum", "replica"};
+  std::vector<std::string> names = source_formats();
+  names.emplace_back("auto");
   const std::string nearest = nearest_name(name, names);
-  return error("unknown format '{}'{}; there are auto, tum and replica", name,
-               nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest));
+  return error("unknown format '{}'{}; there are {}", name,
+               nearest.empty() ? "" : fmt::format(" (did you mean '{}'?)", nearest), fmt::join(names, ", "));
 }
 
 Status check_folder(const fs::path& path) {
@@ -46,18 +51,24 @@ Status check_folder(const fs::path& path) {
 
 }  // namespace
 
+std::vector<std::string> source_formats() {
+  std::vector<std::string> names;
+  for (const Format& format : formats()) names.push_back(format.name);
+  return names;
+}
+
 Result<std::unique_ptr<FrameSource>> open_source(const fs::path& path, const SourceOptions& options) {
   if (const Status status = check_folder(path); !status) return status.error();
   for (const Format& format : formats()) {
-    if (options.format == format.name) return format.open(path, options.camera);
+    if (options.format == format.name) return format.open(path, options);
   }
   if (options.format != "auto") return unknown_format(options.format);
   for (const Format& format : formats()) {
-    if (format.matches(path)) return format.open(path, options.camera);
+    if (format.matches(path)) return format.open(path, options);
   }
   return error(
-      "cannot tell the format of {}: found neither associations.txt, nor rgb.txt with depth.txt (TUM RGB-D), nor "
-      "results/frame*.jpg (Replica)",
+      "cannot tell the format of {}: found neither associations.txt nor rgb.txt (TUM RGB-D), nor mav0/cam0/data.csv "
+      "(EuRoC), nor calib.txt with image_0 or image_2 (KITTI), nor results/frame*.jpg (Replica)",
       path.string());
 }
 

@@ -4,7 +4,9 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "base/result.h"
 #include "sources/frame.h"
@@ -12,9 +14,13 @@
 namespace photoslam {
 
 struct SourceOptions {
-  std::string format = "auto";   ///< "auto", "tum" or "replica".
-  std::filesystem::path camera;  ///< A camera.yaml to use instead of the dataset's own calibration; empty = its own.
+  std::string format = "auto";            ///< "auto" or one of source_formats().
+  std::filesystem::path camera = {};      ///< A calibration to use instead of the dataset's own; empty = its own.
+  std::optional<SensorKind> sensor = {};  ///< Guessed from the data where not given.
 };
+
+/// Names of the layouts that can be read.
+std::vector<std::string> source_formats();
 
 /// Opens a dataset for reading. Images are read one by one as they are asked for.
 ///

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sources/replica_source.h"
 
-#include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <map>
@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "sources/camera_file.h"
 #include "sources/image_list_source.h"
+#include "sources/sensor_choice.h"
 
 namespace photoslam::internal {
 namespace {
@@ -45,7 +46,7 @@ fs::path scene_folder(const fs::path& folder) {
 }
 
 /// Depth files whose colour image is missing make no frame.
-std::vector<ListedFrame> list_frames(const fs::path& images) {
+std::vector<ListedFrame> list_frames(const fs::path& images, SensorKind sensor) {
   std::map<int64_t, fs::path> colors;
   std::error_code code;
   for (const auto& entry : fs::directory_iterator(images, code)) {
@@ -55,7 +56,9 @@ std::vector<ListedFrame> list_frames(const fs::path& images) {
   std::vector<ListedFrame> frames;
   for (const auto& [number, color] : colors) {
     const std::string digits = color.stem().string().substr(std::string_view("frame").size());
-    frames.push_back({replica_time_ns(number), color, images / fmt::format("depth{}.png", digits)});
+    ListedFrame frame{replica_time_ns(number), color, {}, {}};
+    if (sensor == SensorKind::rgbd) frame.depth = images / fmt::format("depth{}.png", digits);
+    frames.push_back(std::move(frame));
   }
   return frames;
 }
@@ -108,23 +111,25 @@ bool looks_like_replica(const fs::path& folder) {
   return false;
 }
 
-Result<std::unique_ptr<FrameSource>> open_replica(const fs::path& folder, const fs::path& camera_file) {
-  const Result<CameraFile> camera = find_camera(scene_folder(folder), camera_file);
+Result<std::unique_ptr<FrameSource>> open_replica(const fs::path& folder, const SourceOptions& options) {
+  const Result<CameraFile> camera = find_camera(scene_folder(folder), options.camera);
   if (!camera) return camera.error();
   const fs::path images = image_folder(folder);
-  std::vector<ListedFrame> frames = list_frames(images);
+  const std::string name = fmt::format("{} (Replica)", scene_folder(folder).filename().string());
+  constexpr std::array<SensorKind, 2> kAvailable = {SensorKind::rgbd, SensorKind::mono};
+  const Result<SensorKind> sensor = choose_sensor(options.sensor, kAvailable, name);
+  if (!sensor) return sensor.error();
+  std::vector<ListedFrame> frames = list_frames(images, *sensor);
   if (frames.empty()) return error("{} has no images named frame000000.jpg", images.string());
 
   SourceInfo info;
   info.format = "replica";
-  info.name = fmt::format("{} (Replica)", scene_folder(folder).filename().string());
+  info.name = name;
+  info.sensor = *sensor;
   info.camera = camera->camera;
   info.distortion = camera->distortion;
   constexpr double kDefaultDepthScale = 6553.5;
-  if (!camera->depth_scale) {
-    info.notes.push_back(fmt::format("no depth_scale given: taking {} depth units for one metre", kDefaultDepthScale));
-  }
-  info.metres_per_depth_unit = 1 / camera->depth_scale.value_or(kDefaultDepthScale);
+  if (info.sensor == SensorKind::rgbd) set_depth_unit(camera->depth_scale, kDefaultDepthScale, info);
   info.frames_per_second = kReplicaFramesPerSecond;
   return make_image_list_source(std::move(info), std::move(frames));
 }

@@ -17,7 +17,6 @@ bool looks_like_replica(const std::filesystem::path& folder);
 
 /// Replica as rendered for NICE-SLAM: results/frame000000.jpg, results/depth000000.png, cam_params.json inside the
 /// scene or beside it. Frame n is at n / 30 s.
-Result<std::unique_ptr<FrameSource>> open_replica(const std::filesystem::path& folder,
-                                                  const std::filesystem::path& camera_file);
+Result<std::unique_ptr<FrameSource>> open_replica(const std::filesystem::path& folder, const SourceOptions& options);
 
 }  // namespace photoslam::internal

@@ -43,7 +43,7 @@ class SourceRobustnessTest : public TempFolderTest {
 
   /// Opens the folder and reads it to the end.
   void read_all(const char* format) const {
-    auto source = open_source(folder, {.format = format, .camera = {}});
+    auto source = open_source(folder, {.format = format});
     if (!source.ok()) {
       EXPECT_FALSE(source.error().message.empty());
       return;
@@ -63,7 +63,7 @@ class SourceRobustnessTest : public TempFolderTest {
       read_all(format);
     }
     write_fast(name, std::string(content));
-    auto source = open_source(folder, {.format = format, .camera = {}});
+    auto source = open_source(folder, {.format = format});
     ASSERT_TRUE(source.ok()) << source.error().message;
     EXPECT_EQ((*source)->info().num_frames, 3);
   }
@@ -87,6 +87,42 @@ TEST_F(SourceRobustnessTest, DamagedReplicaCalibration) {
   survive("cam_params.json",
           R"({"camera": {"w": 16, "h": 12, "fx": 10.0, "fy": 10.0, "cx": 7.5, "cy": 5.5, "scale": 6553.5}})", 1500,
           "replica");
+}
+
+TEST_F(SourceRobustnessTest, DamagedEuroc) {
+  constexpr std::string_view kSensor =
+      "%YAML:1.0\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0, -1, 0, 1, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nrate_hz: 20\n"
+      "resolution: [16, 12]\nintrinsics: [10, 11, 7.5, 5.5]\ndistortion_model: radial-tangential\n"
+      "distortion_coefficients: [-0.2, 0.1, 0.001, 0.002]\n";
+  const char* list = "#timestamp [ns],filename\n1000000000,0.png\n1050000000,1.png\n1100000000,2.png\n";
+  for (const char* camera : {"cam0", "cam1"}) {
+    fs::create_directories(folder / "mav0" / camera);
+    fs::rename(folder / (camera == std::string("cam0") ? "rgb" : "depth"), folder / "mav0" / camera / "data");
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_TRUE(write_png(folder / "mav0" / camera / fmt::format("data/{}.png", i), ImageU8(16, 12, 1, 9)).ok());
+    }
+    write_fast(fmt::format("mav0/{}/sensor.yaml", camera), std::string(kSensor));
+    write_fast(fmt::format("mav0/{}/data.csv", camera), list);
+  }
+  survive("mav0/cam1/sensor.yaml", kSensor, 700, "euroc");
+  survive("mav0/cam1/data.csv", list, 300, "euroc");
+}
+
+TEST_F(SourceRobustnessTest, DamagedKitti) {
+  fs::create_directories(folder / "image_0");
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(write_png(folder / fmt::format("image_0/{:06}.png", i), ImageU8(16, 12, 1, 9)).ok());
+  }
+  fs::create_directories(folder / "image_1");
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(write_png(folder / fmt::format("image_1/{:06}.png", i), ImageU8(16, 12, 1, 9)).ok());
+  }
+  const char* calib = "P0: 10 0 7.5 0 0 10 5.5 0 0 0 1 0\nP1: 10 0 7.5 -5 0 10 5.5 0 0 0 1 0\n";
+  const char* times = "0.0e+00\n1.0e-01\n2.0e-01\n";
+  write_fast("calib.txt", calib);
+  write_fast("times.txt", times);
+  survive("calib.txt", calib, 700, "kitti");
+  survive("times.txt", times, 500, "kitti");
 }
 
 TEST_F(SourceRobustnessTest, DamagedGroundTruth) {

@@ -11,7 +11,6 @@ bool looks_like_tum(const std::filesystem::path& folder);
 
 /// TUM RGB-D (Sturm et al. 2012): associations.txt, or rgb.txt and depth.txt matched by nearest time within 20 ms. The
 /// time of a frame is that of its colour image.
-Result<std::unique_ptr<FrameSource>> open_tum(const std::filesystem::path& folder,
-                                              const std::filesystem::path& camera_file);
+Result<std::unique_ptr<FrameSource>> open_tum(const std::filesystem::path& folder, const SourceOptions& options);
 
 }  // namespace photoslam::internal
