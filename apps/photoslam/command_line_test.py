@@ -22,7 +22,7 @@ from pathlib import Path
 BINARY = os.environ["PHOTOSLAM_BINARY"]
 SEQUENCE = Path(os.environ.get("PHOTOSLAM_SEQUENCE", "no sequence"))
 SOURCE_DIR = Path(os.environ.get("PHOTOSLAM_SOURCE_DIR", Path(__file__).resolve().parents[2]))
-COMMANDS = ["run", "eval", "render", "synth", "doctor", "config"]
+COMMANDS = ["run", "eval", "render", "export", "synth", "doctor", "config"]
 FAST = ["--pace", "asap", "--set", "pipeline.iterations_per_frame=1"]
 
 
@@ -291,6 +291,23 @@ class RunTest(CommandLineTest):
         self.assertEqual(result.returncode, 0, result.stderr)
         after = json.loads((output / "report.json").read_text(encoding="utf-8"))
         self.assertAlmostEqual(before["ate"]["rmse_m"], after["ate"]["rmse_m"], places=9)
+
+    def test_exports_for_other_programs(self):
+        run = self.run_deterministic("run")
+        for kind in ("ply", "spz", "splat"):
+            target = self.folder / f"map.{kind}"
+            result = photoslam("export", run, "--to", kind, "--output", target)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertGreater(target.stat().st_size, 1000)
+        self.assertEqual((self.folder / "map.ply").read_bytes(), (run / "map.ply").read_bytes())
+        self.assertEqual(photoslam("export", run, "--to", "transforms", "--output", self.folder / "nerf").returncode, 0)
+        frames = json.loads((self.folder / "nerf" / "transforms.json").read_text(encoding="utf-8"))["frames"]
+        self.assertGreater(len(frames), 0)
+        for frame in frames:
+            self.assertTrue((self.folder / "nerf" / frame["file_path"]).is_file())
+        self.assertEqual(photoslam("export", run, "--to", "colmap", "--output", self.folder / "colmap").returncode, 0)
+        self.assertTrue((self.folder / "colmap" / "sparse" / "0" / "points3D.txt").is_file())
+        self.assert_fails(photoslam("export", run / "map.ply", "--to", "colmap", "--output", self.output), 1, "run")
 
     def test_interrupted_run_saves_what_it_has(self):
         command = [BINARY, "run", str(SEQUENCE), "--output", str(self.output), "--refine-seconds", "120"]

@@ -16,5 +16,6 @@ void add_synth(CommandLine& line);
 void add_bench(CommandLine& line);
 void add_doctor(CommandLine& line);
 void add_config(CommandLine& line);
+void add_export(CommandLine& line);
 
 }  // namespace photoslam

@@ -71,4 +71,29 @@ Result<std::vector<PosedCamera>> read_transforms_json(const std::filesystem::pat
   }
 }
 
+Status write_transforms_json(const std::filesystem::path& path, std::span<const PosedCamera> cameras) {
+  nlohmann::ordered_json frames = json::array();
+  for (const PosedCamera& posed : cameras) {
+    Eigen::Matrix4d world_from_camera = posed.camera_from_world.inverse().matrix();
+    world_from_camera.col(1) *= -1;
+    world_from_camera.col(2) *= -1;
+    nlohmann::ordered_json rows = json::array();
+    for (int r = 0; r < 4; ++r) {
+      rows.push_back(
+          {world_from_camera(r, 0), world_from_camera(r, 1), world_from_camera(r, 2), world_from_camera(r, 3)});
+    }
+    const PinholeCamera& c = posed.camera;
+    frames.push_back({{"file_path", posed.image.lexically_relative(path.parent_path()).generic_string()},
+                      {"w", c.width},
+                      {"h", c.height},
+                      {"fl_x", c.fx},
+                      {"fl_y", c.fy},
+                      {"cx", c.cx + 0.5},
+                      {"cy", c.cy + 0.5},
+                      {"transform_matrix", rows}});
+  }
+  const nlohmann::ordered_json all = {{"camera_model", "OPENCV"}, {"frames", frames}};
+  return write_file_atomically(path, all.dump(1) + "\n");
+}
+
 }  // namespace photoslam

@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <span>
 #include <vector>
 
 #include "base/result.h"
@@ -21,5 +23,27 @@ struct PosedCamera {
 /// world_from_camera matrices in OpenGL axes (y up, z backwards), converted to ours. Its pixel centres lie at +½.
 /// Distortion other than zero is an error: such images have to be undistorted first.
 Result<std::vector<PosedCamera>> read_transforms_json(const std::filesystem::path& path);
+
+/// Writes such a file, with intrinsics per frame and image paths relative to its folder; atomically.
+Status write_transforms_json(const std::filesystem::path& path, std::span<const PosedCamera> cameras);
+
+/// A point of a sparse model.
+struct SparsePoint {
+  Vec3 position = Vec3::Zero();  ///< World frame.
+  uint8_t color[3] = {128, 128, 128};
+};
+
+/// Writes a COLMAP model as text into a folder (cameras.txt, images.txt, points3D.txt), so that every trainer of
+/// gaussians can take over; COLMAP's pixel centres lie at +½. One camera for each different calibration.
+Status write_colmap_model(const std::filesystem::path& folder, std::span<const PosedCamera> cameras,
+                          std::span<const SparsePoint> points);
+
+/// Reads the cameras of a COLMAP model in text form; images are looked for in `images`. Only undistorted cameras
+/// (PINHOLE, SIMPLE_PINHOLE) are taken; errors name file and line.
+Result<std::vector<PosedCamera>> read_colmap_cameras(const std::filesystem::path& folder,
+                                                     const std::filesystem::path& images);
+
+/// Reads its points3D.txt.
+Result<std::vector<SparsePoint>> read_colmap_points(const std::filesystem::path& folder);
 
 }  // namespace photoslam

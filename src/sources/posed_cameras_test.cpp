@@ -31,6 +31,68 @@ TEST(PosedCameras, ConvertsAxesAndPixelCentres) {
   EXPECT_EQ(c.image.filename(), "a.png");
 }
 
+std::vector<PosedCamera> two_cameras(const std::filesystem::path& folder) {
+  const SE3 a(Quat(Eigen::AngleAxisd(0.7, Vec3(1, -2, 3).normalized())), Vec3(0.1, -2, 3));
+  return {{{64, 48, 50, 51, 31.25, 22.5}, a, folder / "images" / "000001.png"},
+          {{32, 24, 25, 25.5, 15, 11}, a.inverse(), folder / "images" / "000002.png"}};
+}
+
+void expect_equal(const std::vector<PosedCamera>& read, const std::vector<PosedCamera>& written) {
+  ASSERT_EQ(read.size(), written.size());
+  for (size_t i = 0; i < read.size(); ++i) {
+    EXPECT_EQ(read[i].camera, written[i].camera);
+    EXPECT_EQ(read[i].image, written[i].image);
+    const SE3 difference = read[i].camera_from_world * written[i].camera_from_world.inverse();
+    EXPECT_LT(difference.translation.norm(), 1e-7);
+    EXPECT_LT(difference.rotation.vec().norm(), 1e-7);
+  }
+}
+
+TEST(PosedCameras, TransformsComeBack) {
+  const std::filesystem::path folder = testing::TempDir();
+  const auto cameras = two_cameras(folder);
+  const auto path = folder / fmt::format("written_{}.json", ::getpid());
+  ASSERT_TRUE(write_transforms_json(path, cameras).ok());
+  const auto read = read_transforms_json(path);
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  expect_equal(*read, cameras);
+}
+
+TEST(PosedCameras, ColmapModelsComeBack) {
+  const auto folder = std::filesystem::path(testing::TempDir()) / fmt::format("colmap_{}", ::getpid());
+  std::filesystem::create_directories(folder);
+  const auto cameras = two_cameras(folder);
+  const std::vector<SparsePoint> points = {{Vec3(1, -2, 0.125), {1, 20, 255}}};
+  ASSERT_TRUE(write_colmap_model(folder, cameras, points).ok());
+  const auto read = read_colmap_cameras(folder, folder / "images");
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  expect_equal(*read, cameras);
+  const auto read_points = read_colmap_points(folder);
+  ASSERT_TRUE(read_points.ok());
+  ASSERT_EQ(read_points->size(), 1u);
+  EXPECT_EQ(read_points->front().position, points[0].position);
+  EXPECT_EQ(read_points->front().color[2], 255);
+}
+
+TEST(PosedCameras, ColmapImagesMayHaveFeaturesAndErrorsNameTheLine) {
+  const auto folder = std::filesystem::path(testing::TempDir()) / fmt::format("colmap_bad_{}", ::getpid());
+  std::filesystem::create_directories(folder);
+  const auto put = [&](const char* name, const char* text) {
+    ASSERT_TRUE(write_file_atomically(folder / name, text).ok());
+  };
+  put("cameras.txt", "# comment\n7 SIMPLE_PINHOLE 64 48 50 32 24\n");
+  put("images.txt", "# comment\n1 1 0 0 0 0 0 0 7 a.png\n10 20 -1 11 21 -1\n2 1 0 0 0 0 0 1 7 b.png\n\n");
+  const auto read = read_colmap_cameras(folder, folder);
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  ASSERT_EQ(read->size(), 2u);
+  EXPECT_EQ(read->back().camera.cx, 31.5);
+  put("images.txt", "# comment\n1 1 0 0 0 0 0 0 7 a.png\n\n2 1 0 0 0 0 0 1 8 b.png\n\n");
+  EXPECT_NE(read_colmap_cameras(folder, folder).error().message.find("images.txt:4: camera 8"), std::string::npos);
+  put("cameras.txt", "7 OPENCV 64 48 50 50 32 24 0.1 0 0 0\n");
+  EXPECT_NE(read_colmap_cameras(folder, folder).error().message.find("cameras.txt:1: camera model OPENCV"),
+            std::string::npos);
+}
+
 TEST(PosedCameras, BadFilesNameThemselves) {
   for (
       const char* text :

@@ -1,0 +1,126 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <map>
+#include <memory>
+
+#include "base/file.h"
+#include "commands.h"
+#include "evaluation/frame_log.h"
+#include "io/gaussian_spz.h"
+#include "io/image_file.h"
+#include "pipeline/frame_rectifier.h"
+#include "run_folder.h"
+#include "sources/posed_cameras.h"
+
+namespace photoslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ExportArguments {
+  fs::path input;
+  std::string to;
+  fs::path output;
+};
+
+constexpr size_t kSparsePoints = 20000;  // of the gaussians, as a start for other trainers
+
+/// The most solid gaussians as points.
+std::vector<SparsePoint> sparse_points(const GaussianTable& map) {
+  constexpr float kSh0 = 0.28209479177387814f;
+  std::vector<std::pair<float, size_t>> order;
+  for (size_t i = 0; i < map.size(); ++i) order.emplace_back(-map.row(i)[GaussianTable::kOpacity], i);
+  std::ranges::sort(order);
+  order.resize(std::min(order.size(), kSparsePoints));
+  std::vector<SparsePoint> points;
+  for (const auto& entry : order) {
+    const auto row = map.row(entry.second);
+    SparsePoint& point = points.emplace_back();
+    for (int k = 0; k < 3; ++k) point.position[k] = static_cast<double>(row[static_cast<size_t>(k)]);
+    for (size_t c = 0; c < 3; ++c) {
+      const float value = 255 * (0.5f + kSh0 * row[GaussianTable::kShDc + c]);
+      point.color[c] = static_cast<uint8_t>(std::clamp(value, 0.0f, 255.0f));
+    }
+  }
+  return points;
+}
+
+/// Writes the rectified pictures of the run's keyframes into `images` and says where they were taken.
+Result<std::vector<PosedCamera>> write_keyframe_images(const fs::path& run, const fs::path& images) {
+  const auto description = read_run_description(run);
+  if (!description) return description.error();
+  const auto keyframes = read_tum_trajectory(run / "keyframes.tum");
+  if (!keyframes) return keyframes.error();
+  auto source = open_source(description->dataset, description->source);
+  if (!source) return source.error();
+  if (Status status = prepare_output_folder(images); !status) return status.error();
+  std::map<int64_t, SE3> pose_at;
+  for (const StampedPose& pose : *keyframes) pose_at[pose.timestamp_ns] = pose.world_from_camera.inverse();
+  const FrameRectifier rectifier((*source)->info());
+  std::vector<PosedCamera> cameras;
+  while (auto frame = (*source)->next()) {
+    const auto pose = pose_at.find(frame->timestamp_ns);
+    if (pose == pose_at.end() || !frame->defect.empty()) continue;
+    const fs::path image = images / fmt::format("{:06}.png", frame->id.value);
+    if (Status status = write_png(image, rectifier.color(std::move(frame->color))); !status) return status.error();
+    cameras.push_back({rectifier.camera(), pose->second, image});
+  }
+  return cameras;
+}
+
+Status export_cameras(const ExportArguments& arguments, const GaussianTable& map) {
+  if (!fs::is_directory(arguments.input)) {
+    return error("{}: --to {} needs the output folder of a run: a map alone has no cameras", arguments.input.string(),
+                 arguments.to);
+  }
+  const auto cameras = write_keyframe_images(arguments.input, arguments.output / "images");
+  if (!cameras) return cameras.error();
+  if (arguments.to == "transforms") {
+    if (Status status = write_transforms_json(arguments.output / "transforms.json", *cameras); !status) return status;
+  } else {
+    const fs::path model = arguments.output / "sparse" / "0";
+    if (Status status = prepare_output_folder(model); !status) return status;
+    if (Status status = write_colmap_model(model, *cameras, sparse_points(map)); !status) return status;
+  }
+  fmt::print("{} keyframes with their images in {}\n", cameras->size(), arguments.output.string());
+  return {};
+}
+
+Status export_map(const ExportArguments& arguments) {
+  const auto map = read_gaussian_ply(fs::is_directory(arguments.input) ? arguments.input / "map.ply" : arguments.input);
+  if (!map) return map.error();
+  if (arguments.to == "transforms" || arguments.to == "colmap") return export_cameras(arguments, *map);
+  const auto report = arguments.to == "spz"     ? write_gaussian_spz(arguments.output, *map)
+                      : arguments.to == "splat" ? write_gaussian_splat(arguments.output, *map)
+                                                : write_gaussian_ply(arguments.output, *map);
+  if (!report) return report.error();
+  std::error_code ignored;
+  fmt::print("{} gaussians, {:.2f} MB: {}\n", report->written,
+             1e-6 * static_cast<double>(fs::file_size(arguments.output, ignored)), arguments.output.string());
+  if (report->left_out > 0) fmt::print("{} left out: not finite or out of the format's range\n", report->left_out);
+  return {};
+}
+
+}  // namespace
+
+void add_export(CommandLine& line) {
+  auto arguments = std::make_shared<ExportArguments>();
+  CLI::App& command = line.add("export", "Write a map, or its cameras, for other programs",
+                               "  photoslam export output/desk --to spz --output desk.spz\n"
+                               "  photoslam export output/desk --to transforms --output desk-nerfstudio\n"
+                               "  photoslam export map.ply --to splat --output map.splat\n");
+  ExportArguments& a = *arguments;
+  command.add_option("map", a.input, "The output folder of a run, or a map.ply")->required();
+  command
+      .add_option("--to", a.to,
+                  "ply, spz, splat: the gaussians in one file; transforms, colmap: a folder with the keyframes' images "
+                  "and poses for other trainers")
+      ->required()
+      ->check(CLI::IsMember({"ply", "spz", "splat", "transforms", "colmap"}));
+  command.add_option("--output", a.output, "File, or folder for transforms and colmap")->required();
+  line.on_run(command, [arguments] { return export_map(*arguments); });
+}
+
+}  // namespace photoslam
