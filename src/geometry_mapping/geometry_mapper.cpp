@@ -49,6 +49,15 @@ GeometryUpdate GeometryMapper::process(const KeyframeProposal& proposal, const s
   return update;
 }
 
+std::shared_ptr<const MapSnapshot> GeometryMapper::correct(const MapCorrection& correction) {
+  map_.apply(correction);
+  for (const auto& [from, to] : correction.duplicates) {
+    if (map_.landmark(from).view.alive && map_.landmark(to).view.alive) map_.fuse(from, to);
+  }
+  for (const KeyframeId keyframe : correction.loop_keyframes) fuse_into(keyframe, correction.loop_landmarks);
+  return map_.snapshot();
+}
+
 void GeometryMapper::insert(const KeyframeProposal& proposal) {
   // The pose was estimated in an older map: it follows its reference keyframe into this one.
   const SE3 camera_from_world =

@@ -40,12 +40,18 @@ struct GeometryUpdate {
 class GeometryMapper {
  public:
   GeometryMapper(const GeometryMapperOptions& options, const OrbOptions& orb, const PinholeCamera& camera, double bf);
+  /// Continues with a map made before.
+  void set_map(Map map) { map_ = std::move(map); }
 
   /// Adds the keyframe, culls and creates landmarks, fuses duplicates, adjusts, publishes. `interrupted` (asked between
   /// iterations) ends the adjustment early.
   GeometryUpdate process(const KeyframeProposal& proposal, const std::function<bool()>& interrupted = {});
 
+  /// Takes over what loop closure found: moves the map, fuses what is double, publishes.
+  std::shared_ptr<const MapSnapshot> correct(const MapCorrection& correction);
+
   const Map& map() const { return map_; }
+  std::shared_ptr<const MapSnapshot> snapshot() { return map_.snapshot(); }
 
  private:
   void insert(const KeyframeProposal& proposal);

@@ -57,7 +57,7 @@ Keyframe& Map::add_keyframe(KeyframeId id, std::shared_ptr<const FeatureFrame> f
   PHOTOSLAM_CHECK(static_cast<size_t>(id.value) == keyframes_.size(), "keyframe {} after {}", id.value,
                   keyframes_.size());
   std::vector<LandmarkId> none(frame->size());
-  keyframes_.push_back({id, std::move(frame), camera_from_world, std::move(none), KeyframeId{}});
+  keyframes_.push_back({id, std::move(frame), camera_from_world, std::move(none), KeyframeId{}, 1.0});
   return mutable_keyframe(id);
 }
 
@@ -142,6 +142,34 @@ void Map::set_pose(KeyframeId id, const SE3& camera_from_world) {
   mutable_keyframe(id).camera_from_world = camera_from_world;
 }
 
+void Map::apply(const MapCorrection& correction) {
+  std::vector<Sim3> moves;  // [K] new_world_from_old_world
+  for (Keyframe& keyframe : keyframes_) {
+    const auto id = static_cast<size_t>(keyframe.id.value);
+    if (id < correction.new_world_from_old_world.size()) {
+      moves.push_back(correction.new_world_from_old_world[id]);
+    } else {
+      moves.push_back(keyframe.parent.valid() ? moves[static_cast<size_t>(keyframe.parent.value)] : Sim3{});
+    }
+    const Sim3 camera_from_new_world = Sim3(keyframe.camera_from_world) * moves.back().inverse();
+    set_pose(keyframe.id, camera_from_new_world.rigid());
+    keyframe.scale *= moves.back().scale;
+  }
+  for (size_t i = 0; i < landmarks_.size(); ++i) {
+    if (!landmarks_[i].view.alive) continue;
+    const KeyframeId reference =
+        std::ranges::min(landmarks_[i].observations, {}, &LandmarkObservation::keyframe).keyframe;
+    const LandmarkId id(static_cast<int32_t>(i));
+    Vec3 position = moves[static_cast<size_t>(reference.value)] * landmarks_[i].view.position;
+    if (const auto shift = correction.landmark_shifts.find(id); shift != correction.landmark_shifts.end()) {
+      position += shift->second;
+    }
+    set_position(id, position);
+    update_view(id);
+  }
+  ++num_corrections_;
+}
+
 void Map::count_sightings(LandmarkId id, int visible, int found) {
   Landmark& landmark = landmarks_[static_cast<size_t>(id.value)];  // no reader sees the counters
   landmark.times_visible += visible;
@@ -166,6 +194,7 @@ std::vector<CovisibleKeyframe> Map::covisible_keyframes(KeyframeId id, int min_s
 std::shared_ptr<const MapSnapshot> Map::snapshot() {
   auto next = published_ ? std::make_shared<MapSnapshot>(*published_) : std::make_shared<MapSnapshot>();
   ++next->version;
+  next->num_corrections = num_corrections_;
   next->keyframes.resize(keyframes_.size());
   for (const KeyframeId id : changed_keyframes_) {
     const Keyframe& current = keyframe(id);

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "map/map_correction.h"
 #include "map/snapshot.h"
 
 namespace photoslam {
@@ -37,6 +38,8 @@ class Map {
   void update_view(LandmarkId landmark);
   void set_position(LandmarkId landmark, const Vec3& position);
   void set_pose(KeyframeId keyframe, const SE3& camera_from_world);
+  /// Moves everything as the correction says; what was added since it was computed follows its ancestors.
+  void apply(const MapCorrection& correction);
 
   size_t num_keyframes() const { return keyframes_.size(); }
   size_t num_landmarks() const { return landmarks_.size(); }
@@ -62,6 +65,7 @@ class Map {
   std::deque<Landmark> landmarks_;
   std::set<KeyframeId> changed_keyframes_;  // since the last snapshot
   std::set<int> changed_chunks_;
+  int num_corrections_ = 0;
   std::shared_ptr<const MapSnapshot> published_;
 };
 

@@ -127,5 +127,71 @@ TEST_F(MapTest, ViewOfALandmarkFollowsItsObservers) {
   EXPECT_EQ(view.descriptor, map.keyframe(KeyframeId(0)).frame->features.descriptors[0]);
 }
 
+/// Two keyframes that see the same points, and a third one made after the second.
+class CorrectedMap : public ::testing::Test {
+ protected:
+  CorrectedMap() {
+    for (int k = 0; k < 3; ++k) {
+      const SE3 pose = testing::PointWorld::camera_from_world(0.2 * k);
+      const auto frame = world.observe(pose, k);
+      map.add_keyframe(KeyframeId(k), frame, pose);
+      if (k > 0) map.set_parent(KeyframeId(k), KeyframeId(k - 1));
+      for (size_t i = 0; i < frame->size(); ++i) {
+        const int point = world.point_of_keypoint[i];
+        if (const auto known = landmark_of_point.find(point); known != landmark_of_point.end()) {
+          map.add_observation(known->second, KeyframeId(k), static_cast<int>(i));
+        } else {
+          landmark_of_point[point] =
+              map.add_landmark(world.points[static_cast<size_t>(point)], KeyframeId(k), static_cast<int>(i));
+        }
+      }
+    }
+  }
+
+  std::vector<Vec2> projections() const {
+    std::vector<Vec2> result;
+    for (int k = 0; k < 3; ++k) {
+      const Keyframe& keyframe = map.keyframe(KeyframeId(k));
+      for (const LandmarkId id : keyframe.landmarks) {
+        result.push_back(world.camera.project(keyframe.camera_from_world * map.landmark(id).view.position));
+      }
+    }
+    return result;
+  }
+
+  testing::PointWorld world{1, 400};
+  Map map{testing::PointWorld::kScaleFactor, testing::PointWorld::kNumLevels};
+  std::map<int, LandmarkId> landmark_of_point;
+};
+
+TEST_F(CorrectedMap, AUniformSimilarityChangesNoProjection) {
+  const Sim3 move(1.4, so3_exp(Vec3(0.2, -0.5, 0.1)), Vec3(1, 2, -3));
+  const auto before = projections();
+  map.apply({.new_world_from_old_world = {move, move}});
+  const auto after = projections();
+  ASSERT_EQ(before.size(), after.size());
+  for (size_t i = 0; i < before.size(); ++i) EXPECT_LT((before[i] - after[i]).norm(), 1e-9) << i;
+  EXPECT_DOUBLE_EQ(map.keyframe(KeyframeId(1)).scale, 1.4);
+  EXPECT_EQ(map.snapshot()->num_corrections, 1);
+}
+
+TEST_F(CorrectedMap, WhatCameLaterFollowsItsAncestor) {
+  const Sim3 stay, move(1.0, so3_exp(Vec3(0, 0.3, 0)), Vec3(0.5, 0, 0));
+  const SE3 relative =
+      map.keyframe(KeyframeId(2)).camera_from_world * map.keyframe(KeyframeId(1)).camera_from_world.inverse();
+  map.apply({.new_world_from_old_world = {stay, move}});
+  const SE3 now =
+      map.keyframe(KeyframeId(2)).camera_from_world * map.keyframe(KeyframeId(1)).camera_from_world.inverse();
+  EXPECT_LT((now * relative.inverse()).log().norm(), 1e-12);
+}
+
+TEST_F(CorrectedMap, LandmarksFollowTheirOldestObserverAndShift) {
+  const LandmarkId id = map.keyframe(KeyframeId(0)).landmarks[0];
+  const Vec3 before = map.landmark(id).view.position;
+  const Sim3 move0(SE3(Quat::Identity(), Vec3(0, 0, 1))), move1(SE3(Quat::Identity(), Vec3(5, 0, 0)));
+  map.apply({.new_world_from_old_world = {move0, move1}, .landmark_shifts = {{id, Vec3(0, 0.25, 0)}}});
+  EXPECT_LT((map.landmark(id).view.position - before - Vec3(0, 0.25, 1)).norm(), 1e-12);
+}
+
 }  // namespace
 }  // namespace photoslam

@@ -32,6 +32,7 @@ class MapSnapshot {
   using LandmarkChunk = std::array<LandmarkView, kChunk>;
 
   uint64_t version = 0;
+  int num_corrections = 0;                                            ///< MapCorrections that have been applied.
   std::vector<std::shared_ptr<const KeyframeView>> keyframes;         ///< [K] by KeyframeId.
   std::vector<std::shared_ptr<const LandmarkChunk>> landmark_chunks;  ///< By LandmarkId / kChunk.
   int num_landmarks = 0;                                              ///< Ids given out, dead ones included.

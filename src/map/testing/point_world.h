@@ -23,8 +23,10 @@ class PointWorld {
   static constexpr double kFarthest = 5.5;  ///< Distance [m] of points that appear on octave 0.
   PinholeCamera camera{640, 480, 525, 525, 321.5, 238.25};
   double bf = 105;
-  double pixel_noise = 0;  ///< σ [px] on octave 0
-  double wrong_share = 0;  ///< Features displaced at random.
+  double pixel_noise = 0;         ///< σ [px] on octave 0
+  double wrong_share = 0;         ///< Features displaced at random.
+  double farthest_visible = 1e9;  ///< [m]
+  double flipped_bits = 0;        ///< Share of the bits of each descriptor that differ from view to view.
 
   explicit PointWorld(uint64_t seed = 1, int num_points = 10000) : random_(seed) {
     for (int i = 0; i < num_points; ++i) {
@@ -46,7 +48,7 @@ class PointWorld {
     point_of_keypoint.clear();
     for (size_t i = 0; i < points.size(); ++i) {
       const Vec3 x = camera_from_world * points[i];
-      if (x.z() < 0.3 || !camera.contains(camera.project(x), 10)) continue;
+      if (x.z() < 0.3 || x.norm() > farthest_visible || !camera.contains(camera.project(x), 10)) continue;
       Vec2 pixel = camera.project(x);
       const double z = x.z();
       const int octave = std::clamp(
@@ -60,6 +62,7 @@ class PointWorld {
       keypoint.octave = octave;
       frame->features.keypoints.push_back(keypoint);
       frame->features.descriptors.push_back(descriptors[i]);
+      if (flipped_bits > 0) flip(frame->features.descriptors.back());
       frame->depth.push_back(static_cast<float>(z));
       frame->observations.push_back({pixel, pixel.x() - bf / z, 1.0 / (scale * scale)});
       point_of_keypoint.push_back(static_cast<int>(i));
@@ -81,6 +84,12 @@ class PointWorld {
   std::vector<int> point_of_keypoint;  ///< Of the last frame observed.
 
  private:
+  void flip(Descriptor& descriptor) {
+    for (int bit = 0; bit < 256; ++bit) {
+      if (random_.uniform() < flipped_bits) descriptor[static_cast<size_t>(bit / 64)] ^= uint64_t{1} << (bit % 64);
+    }
+  }
+
   Random random_;
 };
 

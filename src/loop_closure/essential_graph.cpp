@@ -1,0 +1,69 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "loop_closure/essential_graph.h"
+
+#include <algorithm>
+
+#include "math/median.h"
+
+namespace photoslam {
+namespace {
+
+PoseGraph essential_graph(const MapSnapshot& map, int min_shared) {
+  PoseGraph graph;
+  for (const auto& view : map.keyframes) {
+    graph.pose_from_world.emplace_back(view->keyframe.camera_from_world);
+    graph.pose_is_fixed.push_back(view->keyframe.parent.valid() ? 0 : 1);
+  }
+  const auto connect = [&](KeyframeId a, KeyframeId b) {
+    const Sim3 &a_from_world = graph.pose_from_world[static_cast<size_t>(a.value)],
+               &b_from_world = graph.pose_from_world[static_cast<size_t>(b.value)];
+    graph.edges.push_back({a.value, b.value, b_from_world * a_from_world.inverse()});
+  };
+  for (const auto& view : map.keyframes) {
+    const Keyframe& keyframe = view->keyframe;
+    if (keyframe.parent.valid()) connect(keyframe.parent, keyframe.id);
+    for (const auto& [other, shared] : view->covisible) {
+      if (shared >= min_shared && other < keyframe.id && other != keyframe.parent) connect(other, keyframe.id);
+    }
+  }
+  return graph;
+}
+
+double typical_depth(const MapSnapshot& map) {
+  std::vector<double> depths;
+  for (const auto& view : map.keyframes) {
+    if (view->median_depth > 0) depths.push_back(view->median_depth);
+  }
+  return depths.empty() ? 1.0 : lower_median(depths);
+}
+
+}  // namespace
+
+MapCorrection close_loop(const PoseGraphOptions& options, int min_shared, bool with_scale, const MapSnapshot& map,
+                         const Loop& loop) {
+  PoseGraph graph = essential_graph(map, min_shared);
+  const std::vector<Sim3> before = graph.pose_from_world;
+  // One exact observation against long chains of others: the loop is to be met, not to be averaged away.
+  constexpr double kLoopWeight = 100;
+  graph.edges.push_back({loop.then.value, loop.now.value, loop.now_from_then, kLoopWeight});
+  optimize_pose_graph(options, with_scale, typical_depth(map), graph);
+
+  MapCorrection correction;
+  for (size_t i = 0; i < before.size(); ++i) {
+    correction.new_world_from_old_world.push_back(graph.pose_from_world[i].inverse() * before[i]);
+  }
+  const Keyframe& now = map.keyframe(loop.now).keyframe;
+  for (const auto& [landmark, keypoint] : loop.matches) {
+    LandmarkId present = now.landmarks[static_cast<size_t>(keypoint)];
+    if (map.find(present) != nullptr && present != landmark) correction.duplicates.emplace_back(present, landmark);
+  }
+  correction.loop_landmarks = loop.landmarks;
+  correction.loop_keyframes.push_back(loop.now);
+  for (const auto& neighbour : map.keyframe(loop.now).covisible) {
+    correction.loop_keyframes.push_back(neighbour.keyframe);
+  }
+  return correction;
+}
+
+}  // namespace photoslam

@@ -1,0 +1,18 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+
+#include "map/map_correction.h"
+#include "map/snapshot.h"
+#include "optimization/bundle_adjustment.h"
+
+namespace photoslam {
+
+/// Bundle adjustment of all keyframes and landmarks. Keyframes without parent stay where they are, and one more where
+/// no depth was measured, so that the size of the world stays too.
+MapCorrection adjust_everything(const BundleOptions& options, const PinholeCamera& camera, double bf,
+                                const MapSnapshot& map, const std::function<bool()>& interrupted = {});
+
+}  // namespace photoslam

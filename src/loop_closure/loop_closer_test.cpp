@@ -1,0 +1,97 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "loop_closure/loop_closer.h"
+
+#include <gtest/gtest.h>
+
+#include "geometry_mapping/geometry_mapper.h"
+#include "map/testing/corridor_world.h"
+#include "math/umeyama.h"
+
+namespace photoslam {
+namespace {
+
+using testing::CorridorWorld;
+
+OrbOptions orb() { return {}; }
+
+/// A walk with drift, and what loop closure makes of its map.
+struct Closing {
+  CorridorWorld corridor;
+  double bf;
+  GeometryMapper geometry;
+  LoopCloser closer;
+
+  Closing(CorridorWorld c, bool with_depth, double scale_drift, uint64_t seed, double rotation_error = 0.002)
+      : corridor(std::move(c)),
+        bf(with_depth ? corridor.world.bf : 0),
+        geometry({}, orb(), corridor.world.camera, bf),
+        closer({}, orb(), corridor.world.camera, bf) {
+    geometry.set_map(corridor.drifted_map(0.004, rotation_error, scale_drift, with_depth, seed));
+  }
+
+  void run() {
+    auto map = geometry.snapshot();
+    while (const auto correction = closer.process(*map)) map = geometry.correct(*correction);
+  }
+
+  /// Distance between where the last keyframe is and where it should be, seen from the first.
+  double gap() const {
+    const Map& map = geometry.map();
+    const size_t last = corridor.truth.size() - 1;
+    const auto relative = [](const SE3& first, const SE3& last_pose) { return last_pose * first.inverse(); };
+    const SE3 estimate = relative(map.keyframe(KeyframeId(0)).camera_from_world,
+                                  map.keyframe(KeyframeId(static_cast<int32_t>(last))).camera_from_world);
+    const SE3 exact = relative(corridor.truth[0], corridor.truth[last]);
+    return (estimate.inverse().translation - exact.inverse().translation).norm();
+  }
+
+  double ate() const {
+    std::vector<Vec3> estimate, exact;
+    for (size_t k = 0; k < corridor.truth.size(); ++k) {
+      estimate.push_back(
+          geometry.map().keyframe(KeyframeId(static_cast<int32_t>(k))).camera_from_world.inverse().translation);
+      exact.push_back(corridor.truth[k].inverse().translation);
+    }
+    const Sim3 fit = align_umeyama(estimate, exact, bf <= 0);
+    double sum = 0;
+    for (size_t k = 0; k < exact.size(); ++k) sum += (fit * estimate[k] - exact[k]).squaredNorm();
+    return std::sqrt(sum / static_cast<double>(exact.size()));
+  }
+};
+
+class LoopCloserSeeds : public ::testing::TestWithParam<uint64_t> {};
+INSTANTIATE_TEST_SUITE_P(Ten, LoopCloserSeeds, ::testing::Range(uint64_t{1}, uint64_t{11}));
+
+TEST_P(LoopCloserSeeds, ClosesTheSquareWithDepth) {
+  Closing closing(CorridorWorld::square(10, GetParam()), true, 0, GetParam());
+  const double path = closing.corridor.path_length(), before = closing.gap();
+  ASSERT_GT(before, 0.01 * path);
+  closing.run();
+  EXPECT_GE(closing.closer.num_closed(), 1);
+  EXPECT_LT(closing.gap(), before / 5);
+  EXPECT_LT(closing.ate(), 0.005 * path);
+  EXPECT_EQ(closing.geometry.map().keyframe(KeyframeId(3)).scale, 1.0);
+}
+
+TEST_P(LoopCloserSeeds, ClosesTheSquareWithoutDepth) {
+  Closing closing(CorridorWorld::square(10, GetParam()), false, 0.001, GetParam());
+  const double path = closing.corridor.path_length(), before = closing.gap();
+  ASSERT_GT(before, 0.01 * path);
+  closing.run();
+  EXPECT_GE(closing.closer.num_closed(), 1);
+  EXPECT_LT(closing.gap(), before / 5);
+  EXPECT_LT(closing.ate(), 0.005 * path);
+}
+
+TEST_P(LoopCloserSeeds, RepeatedDoorsAreNoLoop) {
+  for (const bool with_depth : {true, false}) {
+    Closing closing(CorridorWorld::repeated_doors(40, 5, GetParam()), with_depth, 0, GetParam());
+    closing.run();
+    EXPECT_EQ(closing.closer.num_closed(), 0);
+    EXPECT_EQ(closing.closer.num_reconnected(), 0);
+  }
+}
+
+}  // namespace
+}  // namespace photoslam

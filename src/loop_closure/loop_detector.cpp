@@ -1,0 +1,247 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "loop_closure/loop_detector.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+namespace photoslam {
+namespace {
+
+constexpr size_t kIndexedDescriptors = 300;
+
+/// The descriptors of strongest response.
+std::vector<Descriptor> strongest_descriptors(const Features& features) {
+  std::vector<size_t> order(features.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::ranges::stable_sort(
+      order, [&](size_t a, size_t b) { return features.keypoints[a].response > features.keypoints[b].response; });
+  order.resize(std::min(order.size(), kIndexedDescriptors));
+  std::vector<Descriptor> descriptors;
+  for (const size_t i : order) descriptors.push_back(features.descriptors[i]);
+  return descriptors;
+}
+
+/// Tells whether what was found of the expected landmarks is spread over the image as they are.
+class CellCoverage {
+ public:
+  explicit CellCoverage(const PinholeCamera& camera) : camera_(camera) {}
+
+  void count(const ProjectionQuery& query, bool found) {
+    const auto cell = [](float x, int size, int cells) {
+      return std::clamp(static_cast<int>(x * static_cast<float>(cells) / static_cast<float>(size)), 0, cells - 1);
+    };
+    const int index = cell(query.y, camera_.height, kRows) * kColumns + cell(query.x, camera_.width, kColumns);
+    ++expected_[static_cast<size_t>(index)];
+    found_[static_cast<size_t>(index)] += found;
+  }
+
+  double share() const {
+    int cells = 0, covered = 0;
+    for (size_t i = 0; i < expected_.size(); ++i) {
+      if (expected_[i] < kMinExpected) continue;
+      ++cells;
+      covered += found_[i] >= kMinFoundShare * expected_[i];
+    }
+    return cells > 0 ? static_cast<double>(covered) / cells : 0;
+  }
+
+ private:
+  static constexpr int kColumns = 8, kRows = 6, kMinExpected = 3;
+  static constexpr double kMinFoundShare = 0.2;
+  const PinholeCamera& camera_;
+  std::array<int, kColumns * kRows> expected_{}, found_{};
+};
+
+/// The keyframe, those that share landmarks with it, and theirs.
+std::set<KeyframeId> connected(const MapSnapshot& map, KeyframeId id) {
+  std::set<KeyframeId> result{id};
+  for (const auto& first : map.keyframe(id).covisible) {
+    result.insert(first.keyframe);
+    for (const auto& second : map.keyframe(first.keyframe).covisible) result.insert(second.keyframe);
+  }
+  return result;
+}
+
+}  // namespace
+
+void LoopDetectorOptions::visit(OptionVisitor& v) {
+  v.value({"max_candidates", "", 1, 100, "Similar keyframes that are verified for each new one."}, max_candidates);
+  v.value({"min_keyframe_gap", "", 1, 10000, "A loop spans at least so many keyframes."}, min_keyframe_gap);
+  v.value({"min_matches", "", 6, 1000, "Descriptor matches a candidate needs."}, min_matches);
+  v.value({"min_guided_matches", "", 6, 10000, "Landmarks of the old place that must be found again."},
+          min_guided_matches);
+  v.value({"min_matched_share", "", 0.0, 1.0,
+           "Share of the landmarks that should be visible and are found again; lower finds loops under changed light, "
+           "higher resists places that repeat."},
+          min_matched_share);
+  v.value({"min_coverage", "", 0.0, 1.0,
+           "Share of the image, of what should show the old place, in which some of it is found again: a thing that "
+           "looks like another one does not look so all around it."},
+          min_coverage);
+  v.value({"search_radius_px", "px", 0.5, 100.0, "Search radius around a predicted landmark."}, search_radius_px);
+  v.value({"neighbourhood", "", 0, 1000, "Keyframes whose landmarks make up a place."}, neighbourhood);
+  v.value({"confirming_keyframes", "", 0, 100, "Keyframes next to the new one that are asked for confirmation …"},
+          confirming_keyframes);
+  v.value({"min_confirmations", "", 0, 100, "… and how many of them must give it."}, min_confirmations);
+  v.group("ransac", "Robust transform between two keyframes.", ransac);
+}
+
+std::vector<LandmarkId> landmarks_around(const MapSnapshot& map, KeyframeId id, int count) {
+  std::set<LandmarkId> result;
+  const auto take = [&](KeyframeId keyframe) {
+    for (LandmarkId landmark : map.keyframe(keyframe).keyframe.landmarks) {
+      if (map.find(landmark) != nullptr) result.insert(landmark);
+    }
+  };
+  take(id);
+  for (const auto& neighbour : map.keyframe(id).covisible) {
+    if (--count < 0) break;
+    take(neighbour.keyframe);
+  }
+  return {result.begin(), result.end()};
+}
+
+LoopDetector::LoopDetector(const LoopDetectorOptions& options, const OrbOptions& orb, const PinholeCamera& camera,
+                           double bf, bool with_scale)
+    : options_(options), camera_(camera), bf_(bf), with_scale_(with_scale), projector_(orb, camera, bf) {}
+
+std::optional<Loop> LoopDetector::detect(const MapSnapshot& map, KeyframeId now) {
+  for (const PlaceCandidate& candidate : similar_places(map, map.keyframe(now).keyframe)) {
+    auto loop = verify(map, KeyframeId(candidate.place), now);
+    if (loop && confirm(map, *loop)) return loop;
+  }
+  return std::nullopt;
+}
+
+std::vector<PlaceCandidate> LoopDetector::similar_places(const MapSnapshot& map, const Keyframe& now) {
+  const std::vector<Descriptor> descriptors = strongest_descriptors(now.frame->features);
+  const std::set<KeyframeId> known = connected(map, now.id);
+  const auto accept = [&](int place) {
+    return now.id.value - place >= options_.min_keyframe_gap && !known.contains(KeyframeId(place));
+  };
+  auto candidates = index_.query(descriptors, options_.max_candidates, accept);
+  index_.add(now.id.value, descriptors);
+  return candidates;
+}
+
+/// Where a keypoint's landmark is, or what its depth says.
+std::optional<Vec3> LoopDetector::point_in_camera(const MapSnapshot& map, const Keyframe& keyframe,
+                                                  size_t keypoint) const {
+  LandmarkId id = keyframe.landmarks[keypoint];
+  if (const LandmarkView* view = map.find(id)) return keyframe.camera_from_world * view->position;
+  const auto depth = static_cast<double>(keyframe.frame->depth[keypoint]);
+  if (depth > 0) return camera_.unproject(keyframe.frame->observations[keypoint].pixel, depth);
+  return std::nullopt;
+}
+
+std::vector<PointMatch> LoopDetector::match_features(const MapSnapshot& map, const Keyframe& then,
+                                                     const Keyframe& now) const {
+  MatchOptions match_options;
+  match_options.max_distance = 64;
+  match_options.max_ratio = 0.85;
+  std::vector<int> now_of_then;
+  match_brute_force(match_options, then.frame->features, now.frame->features, now_of_then);
+  std::vector<PointMatch> matches;
+  for (size_t i = 0; i < now_of_then.size(); ++i) {
+    if (now_of_then[i] == kNoMatch) continue;
+    const auto j = static_cast<size_t>(now_of_then[i]);
+    const auto in_then = point_in_camera(map, then, i), in_now = point_in_camera(map, now, j);
+    if (!in_then || !in_now) continue;
+    const PixelObservation &seen_then = then.frame->observations[i], &seen_now = now.frame->observations[j];
+    matches.push_back({*in_then, *in_now, seen_then.pixel, seen_now.pixel, 1 / std::sqrt(seen_then.inverse_variance),
+                       1 / std::sqrt(seen_now.inverse_variance)});
+  }
+  return matches;
+}
+
+LoopDetector::Search LoopDetector::search(const MapSnapshot& map, std::span<const LandmarkId> landmarks,
+                                          const SE3& camera_from_world, const Keyframe& keyframe, double radius_px) {
+  projector_.clear();
+  for (LandmarkId id : landmarks) {
+    if (const LandmarkView* view = map.find(id)) {
+      projector_.add(camera_from_world, id, *view, static_cast<float>(radius_px));
+    }
+  }
+  MatchOptions match_options;
+  match_options.max_distance = 64;
+  match_options.check_rotation = false;
+  std::vector<int> keypoint_of_query;
+  matcher_.match(match_options, {keyframe.frame->features, keyframe.frame->grid, {}, {}}, projector_.queries(),
+                 keypoint_of_query);
+  Search result;
+  result.expected = static_cast<int>(projector_.size());
+  CellCoverage cells(camera_);
+  for (size_t query = 0; query < keypoint_of_query.size(); ++query) {
+    const bool found = keypoint_of_query[query] != kNoMatch;
+    cells.count(projector_.queries()[query], found);
+    if (found) result.matches.emplace_back(projector_.landmark(query).id, keypoint_of_query[query]);
+  }
+  result.coverage = cells.share();
+  return result;
+}
+
+bool LoopDetector::is_same_place(const Search& search) const {
+  return static_cast<double>(search.matches.size()) >= options_.min_matched_share * search.expected &&
+         search.coverage >= options_.min_coverage;
+}
+
+std::optional<Loop> LoopDetector::verify(const MapSnapshot& map, KeyframeId then_id, KeyframeId now_id) {
+  const Keyframe &then = map.keyframe(then_id).keyframe, &now = map.keyframe(now_id).keyframe;
+  const std::vector<PointMatch> pairs = match_features(map, then, now);
+  if (static_cast<int>(pairs.size()) < options_.min_matches) return std::nullopt;
+  SimilarityResult found = estimate_similarity_ransac(options_.ransac, camera_, with_scale_, pairs);
+  if (!found.success) return std::nullopt;
+
+  Loop loop{then_id, now_id, found.b_from_a, {}, landmarks_around(map, then_id, options_.neighbourhood)};
+  const Sim3 then_from_world(then.camera_from_world);
+  Search seen;
+  for (const double radius : {options_.search_radius_px, 0.7 * options_.search_radius_px}) {
+    const SE3 now_from_world = (loop.now_from_then * then_from_world).rigid();
+    seen = search(map, loop.landmarks, now_from_world, now, radius);
+    std::vector<PointMatch> guided;
+    std::vector<std::pair<LandmarkId, int>> usable;
+    for (const auto& [id, keypoint] : seen.matches) {
+      const auto j = static_cast<size_t>(keypoint);
+      LandmarkId landmark = id;
+      const Vec3 in_then = then.camera_from_world * map.find(landmark)->position;
+      const auto in_now = point_in_camera(map, now, j);
+      if (!in_now || !(in_then.z() > 0)) continue;
+      const PixelObservation& observed = now.frame->observations[j];
+      const double sigma = 1 / std::sqrt(observed.inverse_variance);
+      guided.push_back({in_then, *in_now, camera_.project(in_then), observed.pixel, sigma, sigma});
+      usable.emplace_back(id, keypoint);
+    }
+    found = refine_similarity(options_.ransac, camera_, with_scale_, guided, loop.now_from_then);
+    if (!found.success) return std::nullopt;
+    loop.now_from_then = found.b_from_a;
+    loop.matches.clear();
+    for (size_t i = 0; i < usable.size(); ++i) {
+      if (found.inlier[i]) loop.matches.push_back(usable[i]);
+    }
+  }
+  const bool enough = static_cast<int>(loop.matches.size()) >= options_.min_guided_matches;
+  return enough && is_same_place(seen) ? std::optional(loop) : std::nullopt;
+}
+
+bool LoopDetector::confirm(const MapSnapshot& map, const Loop& loop) {
+  const std::set<KeyframeId> old_place = connected(map, loop.then);
+  const SE3& then_from_world = map.keyframe(loop.then).keyframe.camera_from_world;
+  const SE3 world_from_now = map.keyframe(loop.now).keyframe.camera_from_world.inverse();
+  int asked = 0, confirmed = 0;
+  for (const auto& neighbour : map.keyframe(loop.now).covisible) {
+    if (asked >= options_.confirming_keyframes || confirmed >= options_.min_confirmations) break;
+    if (old_place.contains(neighbour.keyframe)) continue;
+    ++asked;
+    const Keyframe& keyframe = map.keyframe(neighbour.keyframe).keyframe;
+    const Sim3 neighbour_from_now(keyframe.camera_from_world * world_from_now);
+    const SE3 pose = (neighbour_from_now * loop.now_from_then * Sim3(then_from_world)).rigid();
+    const Search seen = search(map, loop.landmarks, pose, keyframe, options_.search_radius_px);
+    if (static_cast<int>(seen.matches.size()) >= options_.min_matches && is_same_place(seen)) ++confirmed;
+  }
+  return confirmed >= options_.min_confirmations;
+}
+
+}  // namespace photoslam

@@ -1,0 +1,81 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <set>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "features/place_index.h"
+#include "geometry/similarity_ransac.h"
+#include "localization/landmark_projection.h"
+#include "map/snapshot.h"
+
+namespace photoslam {
+
+struct LoopDetectorOptions {
+  int max_candidates = 5;
+  int min_keyframe_gap = 10;
+  int min_matches = 20;
+  int min_guided_matches = 40;
+  double min_matched_share = 0.25;
+  double min_coverage = 0.5;
+  double search_radius_px = 6.0;
+  int neighbourhood = 10;
+  int confirming_keyframes = 5;
+  int min_confirmations = 2;
+  SimilarityRansacOptions ransac;
+  void visit(OptionVisitor& visitor);
+};
+
+/// Keyframe `now` sees again what `then` saw, and the map does not know it yet.
+struct Loop {
+  KeyframeId then, now;
+  Sim3 now_from_then;                               ///< Between the camera frames, by what both see.
+  std::vector<std::pair<LandmarkId, int>> matches;  ///< Landmarks around `then` and keypoints of `now`.
+  std::vector<LandmarkId> landmarks;                ///< All landmarks around `then`.
+};
+
+/// Recognises places: an index of descriptors proposes keyframes that look alike, geometry decides. A loop is reported
+/// only when `now` finds most of the landmarks around `then` that it should see, and so do keyframes next to it: doors
+/// that repeat along a corridor look alike, but not with everything around them. Deterministic.
+class LoopDetector {
+ public:
+  /// `with_scale`: depth was not measured, so the map may have shrunk or grown on the way.
+  LoopDetector(const LoopDetectorOptions& options, const OrbOptions& orb, const PinholeCamera& camera, double bf,
+               bool with_scale);
+
+  /// The loop that a keyframe closes, if there is one. Call once per keyframe, in order; adds it to the index.
+  std::optional<Loop> detect(const MapSnapshot& map, KeyframeId now);
+
+ private:
+  std::vector<PlaceCandidate> similar_places(const MapSnapshot& map, const Keyframe& now);
+  std::optional<Loop> verify(const MapSnapshot& map, KeyframeId then, KeyframeId now);
+  std::vector<PointMatch> match_features(const MapSnapshot& map, const Keyframe& then, const Keyframe& now) const;
+  /// What a keyframe at a given pose finds of the landmarks it should see.
+  struct Search {
+    int expected = 0;
+    double coverage = 0;  ///< Share of the image cells with expected landmarks in which some were found.
+    std::vector<std::pair<LandmarkId, int>> matches;
+  };
+  Search search(const MapSnapshot& map, std::span<const LandmarkId> landmarks, const SE3& camera_from_world,
+                const Keyframe& keyframe, double radius_px);
+  bool is_same_place(const Search& search) const;
+  bool confirm(const MapSnapshot& map, const Loop& loop);
+  std::optional<Vec3> point_in_camera(const MapSnapshot& map, const Keyframe& keyframe, size_t keypoint) const;
+
+  LoopDetectorOptions options_;
+  PinholeCamera camera_;
+  double bf_;
+  bool with_scale_;
+  LandmarkProjector projector_;
+  ProjectionMatcher matcher_;
+  PlaceIndex index_;
+};
+
+/// Landmarks seen by a keyframe or by the `count` keyframes that share most with it, by id.
+std::vector<LandmarkId> landmarks_around(const MapSnapshot& map, KeyframeId keyframe, int count);
+
+}  // namespace photoslam

@@ -1,0 +1,29 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "base/ids.h"
+#include "math/sim3.h"
+
+namespace photoslam {
+
+/// How a loop changes the map: a message from loop closure to geometry mapping, computed on a snapshot. The map may
+/// have grown and moved since; corrections are relative, so that nothing of that is lost.
+struct MapCorrection {
+  /// [K] by KeyframeId of the snapshot: the world around each keyframe moves by this.
+  std::vector<Sim3> new_world_from_old_world = {};
+  /// Moves in addition to that of the oldest observer [m, new world].
+  std::map<LandmarkId, Vec3> landmark_shifts = {};
+
+  /// Landmarks that are the same point: the first is to become the second.
+  std::vector<std::pair<LandmarkId, LandmarkId>> duplicates = {};
+  /// Where more duplicates are to be sought: these landmarks in these keyframes.
+  std::vector<LandmarkId> loop_landmarks = {};
+  std::vector<KeyframeId> loop_keyframes = {};
+};
+
+}  // namespace photoslam
