@@ -116,24 +116,38 @@ size_t GaussianModel::size(int anchor) const {
 }
 
 void GaussianModel::update_bounds(size_t index) {
-  Block& block = *blocks_[index];
+  // Column-wise over the rows, kColumns at a time: compilers turn that into vectors.
+  constexpr int kColumns = 16;
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  Block& block = *blocks_[index];
   float radius2 = 0;
   for (int i = 0; i < 3; ++i) {
-    float low = kInfinity, high = -kInfinity;
+    float lows[kColumns], highs[kColumns];
+    std::fill_n(lows, kColumns, kInfinity);
+    std::fill_n(highs, kColumns, -kInfinity);
     const float* means = block.parameters[row::kMean + i];
-    for (int lane = 0; lane < block.count; ++lane) {
-      if (!(std::abs(means[lane]) < kAbsurd)) continue;
-      low = std::min(low, means[lane]);
-      high = std::max(high, means[lane]);
-    }
+    for (int first = 0; first < kBlockSize; first += kColumns)
+      for (int k = 0; k < kColumns; ++k) {
+        const float x = means[first + k];
+        const bool sane = (first + k < block.count) & (std::abs(x) < kAbsurd);
+        const float low = sane ? x : kInfinity, high = sane ? x : -kInfinity;
+        lows[k] = low < lows[k] ? low : lows[k];
+        highs[k] = high > highs[k] ? high : highs[k];
+      }
+    const float low = *std::min_element(lows, lows + kColumns), high = *std::max_element(highs, highs + kColumns);
     block.center[i] = low <= high ? 0.5f * low + 0.5f * high : 0.0f;
     radius2 += low <= high ? (high - block.center[i]) * (high - block.center[i]) : 0.0f;
   }
-  float log_scale = -kInfinity;
+  float scales[kColumns];
+  std::fill_n(scales, kColumns, -kInfinity);
   for (int i = 0; i < 3; ++i)
-    for (int lane = 0; lane < block.count; ++lane)
-      log_scale = std::max(log_scale, block.parameters[row::kLogScale + i][lane]);
+    for (int first = 0; first < kBlockSize; first += kColumns)
+      for (int k = 0; k < kColumns; ++k) {
+        const float x = block.parameters[row::kLogScale + i][first + k];
+        const float scale = first + k < block.count ? x : -kInfinity;
+        scales[k] = scale > scales[k] ? scale : scales[k];
+      }
+  const float log_scale = *std::max_element(scales, scales + kColumns);
   block.radius = std::sqrt(radius2);
   block.max_scale = std::exp(std::min(log_scale, 80.0f));
 }

@@ -63,22 +63,6 @@ struct InstanceRange {
   uint32_t first, count;
 };
 
-/// Fetches into the caches what projecting a block will read.
-inline void prefetch_parameters(const Block& block, int sh_degree) {
-  const float* rows = block.parameters[0];
-  const int values = (row::kSh + 3 * num_sh_coefficients(sh_degree)) * kBlockSize;
-  for (int i = 0; i < values; i += 16) __builtin_prefetch(rows + i);
-}
-
-/// Fetches what updating it will read and write, besides.
-inline void prefetch_moments(const Block& block, int sh_degree) {
-  const int values = (row::kSh + 3 * num_sh_coefficients(sh_degree)) * kBlockSize;
-  for (int i = 0; i < values; i += 16) {
-    __builtin_prefetch(block.first_moments[0] + i, 1);
-    __builtin_prefetch(block.second_moments[0] + i, 1);
-  }
-}
-
 /// Everything one view of the model needs between the stages. A visible block has a rank; slot = 64 * rank + lane.
 struct Frame {
   int width = 0, height = 0;

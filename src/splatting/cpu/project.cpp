@@ -13,80 +13,126 @@
 #define HWY_TARGET_INCLUDE "splatting/cpu/project.cpp"
 #include "hwy/foreach_target.h"
 #include "hwy/highway.h"
+#include "splatting/cpu/colors-inl.h"
 #include "splatting/cpu/lanes-inl.h"
 #include "splatting/formulas.h"
+
+#ifndef PHOTOSLAM_SPLATTING_PROJECT_ONCE
+#define PHOTOSLAM_SPLATTING_PROJECT_ONCE
+namespace photoslam::splatting {
+
+/// Tiles of the bounding boxes of a block's splats, inclusive.
+struct TileBoxes {
+  alignas(64) int32_t left[kBlockSize], right[kBlockSize], top[kBlockSize], bottom[kBlockSize];
+};
+
+}  // namespace photoslam::splatting
+#endif
 
 HWY_BEFORE_NAMESPACE();
 namespace photoslam::splatting::HWY_NAMESPACE {
 
-/// Colours seen from the camera, clamped at 0; returns which lanes are sane.
-HWY_INLINE LaneMask colors(const Block& block, const Lanes* offset, int degree, size_t lane, Lanes* rgb) {
-  Lanes direction[3], basis[kNumShCoefficients];
-  normalize(offset, direction);
-  sh_basis(degree, direction, basis);
-  for (int c = 0; c < 3; ++c) rgb[c] = Lanes(0.5f);
-  for (int k = 0; k < num_sh_coefficients(degree); ++k)
-    for (int c = 0; c < 3; ++c) rgb[c] = mul_add(basis[k], load(block.parameters[row::kSh + 3 * k + c] + lane), rgb[c]);
-  const Lanes absurd(kAbsurd);
-  const LaneMask ok = (absolute(rgb[0]) < absurd) & (absolute(rgb[1]) < absurd) & (absolute(rgb[2]) < absurd);
-  for (int c = 0; c < 3; ++c) rgb[c] = maximum(rgb[c], Lanes(0.0f));
-  return ok;
+inline constexpr int kSplatRows = 15;
+using SplatRows = float[kSplatRows][kBlockSize];
+enum SplatRow { kRgb = 6 };
+
+/// Projects one vector of gaussians: everything of a splat but its colours, the tiles of its bounding box, and the
+/// basis functions for the colours. Returns the lanes whose box holds a pixel centre. Not-a-number fails every
+/// comparison, so garbage never passes.
+HWY_INLINE Mask project_lanes(const Block& block, const AnchorView& view, int width, int height, int degree,
+                              size_t lane, SplatRows& rows, TileBoxes& boxes, ShBasis& basis) {
+  Lanes mean[3], rotation[4], log_scale[3];
+  for (int i = 0; i < 3; ++i) mean[i] = load(block.parameters[row::kMean + i] + lane);
+  for (int i = 0; i < 4; ++i) rotation[i] = load(block.parameters[row::kRotation + i] + lane);
+  for (int i = 0; i < 3; ++i) log_scale[i] = load(block.parameters[row::kLogScale + i] + lane);
+  Projection<Lanes> g;
+  project(view, mean, rotation, log_scale, g);
+
+  const Lanes logit = load(block.parameters[row::kOpacity] + lane);
+  const Lanes log2_opacity = -logarithm2(Lanes(1.0f) + exponential(minimum(-logit, Lanes(80.0f))));
+  const Lanes cut = log2_opacity + Lanes(kLog2Cut);
+  const Lanes radius2 = cut * Lanes(2.0f * 0.6931471805599453f);
+  const Lanes extent_x = square_root(radius2 * g.a), extent_y = square_root(radius2 * g.c);
+  const Lanes inv_c = Lanes(1.0f) / g.c, inv_det = Lanes(1.0f) / g.det;
+  const Lanes half_log2e(0.5f * 1.4426950408889634f);
+
+  // First and last pixel of the box, inside the image.
+  const Lanes zero(0.0f), absurd(kAbsurd);
+  const Lanes left = hn::Ceil(maximum(g.u - extent_x, zero).v), top = hn::Ceil(maximum(g.v - extent_y, zero).v);
+  const Lanes right = hn::Floor(minimum(g.u + extent_x, Lanes(static_cast<float>(width - 1))).v);
+  const Lanes bottom = hn::Floor(minimum(g.v + extent_y, Lanes(static_cast<float>(height - 1))).v);
+  LaneMask ok = (g.p[2] > Lanes(view.near)) & (g.p[2] < absurd) & (cut > zero) & (g.a < absurd) & (g.c < absurd) &
+                (g.inv_norm > Lanes(1.0f / kAbsurd)) & (absolute(log_scale[0]) < absurd) &
+                (absolute(log_scale[1]) < absurd) & (absolute(log_scale[2]) < absurd) & (g.det > zero) &
+                (inv_det > zero) & (left <= right) & (top <= bottom) & (right >= zero) & (bottom >= zero);
+  const size_t rest = static_cast<size_t>(block.count) - lane;
+  ok = ok & LaneMask{hn::FirstN(kFloats, std::min(rest, kLanes))};
+  if (hn::AllFalse(kFloats, ok.m)) return ok.m;
+
+  constexpr Ints ints;
+  static_assert(kTileSize == 32);
+  const auto tile = [&](Lanes pixel)
+                        HWY_ATTR { return hn::ShiftRight<5>(hn::ConvertTo(ints, hn::IfThenElseZero(ok.m, pixel.v))); };
+  hn::Store(tile(left), ints, boxes.left + lane);
+  hn::Store(tile(right), ints, boxes.right + lane);
+  hn::Store(tile(top), ints, boxes.top + lane);
+  hn::Store(tile(bottom), ints, boxes.bottom + lane);
+
+  store(g.u, rows[0] + lane);
+  store(g.v, rows[1] + lane);
+  store(g.b * inv_c, rows[2] + lane);
+  store(-half_log2e * g.c * inv_det, rows[3] + lane);
+  store(-half_log2e * inv_c, rows[4] + lane);
+  store(log2_opacity, rows[5] + lane);
+  store(g.p[2], rows[9] + lane);
+  store(cut, rows[10] + lane);
+  store(g.det * inv_c / half_log2e, rows[11] + lane);
+  store(g.b * extent_x / g.a, rows[12] + lane);
+  store(extent_x, rows[13] + lane);
+  store(extent_y, rows[14] + lane);
+  Lanes direction[3], functions[kNumShCoefficients];
+  normalize(g.offset, direction);
+  sh_basis(degree, direction, functions);
+  for (int k = 0; k < num_sh_coefficients(degree); ++k) store(functions[k], basis[k] + lane);
+  return ok.m;
 }
 
-/// Projects one block into `splats` [64]; returns the lanes whose ellipse may touch a pixel. Not-a-number fails every
-/// comparison, so garbage never passes.
-uint64_t project_block(const Block& block, const AnchorView& view, int width, int height, int degree, Splat* splats) {
-  alignas(64) float rows[15][kBlockSize];
+/// Projects one block into `splats` [64]; returns the lanes whose ellipse may touch a pixel. Fetches what the next
+/// block (or null) will need first.
+uint64_t project_block(const Block& block, const AnchorView& view, int width, int height, int degree, const Block* next,
+                       Splat* splats, TileBoxes& boxes) {
+  alignas(64) SplatRows rows;
+  alignas(64) ShBasis basis;
+  Mask masks[kBlockSize / kLanes];
+  uint32_t parts = 0;
+  for (size_t i = 0; i < kBlockSize / kLanes; ++i) {
+    masks[i] = hn::FirstN(kFloats, 0);
+    if (static_cast<int>(i * kLanes) >= block.count) continue;
+    for (int r = 0; r < row::kSh; ++r) prefetch_row(block, next, row::kSh + 3 * num_sh_coefficients(degree), r, i);
+    masks[i] = project_lanes(block, view, width, height, degree, i * kLanes, rows, boxes, basis);
+    parts |= static_cast<uint32_t>(!hn::AllFalse(kFloats, masks[i])) << i;
+  }
+  if (parts == 0) return 0;
+  block_colors(block, next, basis, degree, parts, rows + kRgb);
+
   uint64_t visible = 0;
-  for (size_t lane = 0; lane < static_cast<size_t>(block.count); lane += kLanes) {
-    Lanes mean[3], rotation[4], log_scale[3], rgb[3];
-    for (int i = 0; i < 3; ++i) mean[i] = load(block.parameters[row::kMean + i] + lane);
-    for (int i = 0; i < 4; ++i) rotation[i] = load(block.parameters[row::kRotation + i] + lane);
-    for (int i = 0; i < 3; ++i) log_scale[i] = load(block.parameters[row::kLogScale + i] + lane);
-    Projection<Lanes> g;
-    project(view, mean, rotation, log_scale, g);
-
-    const Lanes logit = load(block.parameters[row::kOpacity] + lane);
-    const Lanes log2_opacity = -logarithm2(Lanes(1.0f) + exponential(minimum(-logit, Lanes(80.0f))));
-    const Lanes cut = log2_opacity + Lanes(kLog2Cut);
-    const Lanes radius2 = cut * Lanes(2.0f * 0.6931471805599453f);
-    const Lanes extent_x = square_root(radius2 * g.a), extent_y = square_root(radius2 * g.c);
-    const Lanes inv_c = Lanes(1.0f) / g.c, inv_det = Lanes(1.0f) / g.det;
-    const Lanes half_log2e(0.5f * 1.4426950408889634f);
-
-    const Lanes zero(0.0f), absurd(kAbsurd);
-    LaneMask ok = (g.p[2] > Lanes(view.near)) & (g.p[2] < absurd) & (cut > zero) & (g.a < absurd) & (g.c < absurd) &
-                  (g.inv_norm > Lanes(1.0f / kAbsurd)) & (absolute(log_scale[0]) < absurd) &
-                  (absolute(log_scale[1]) < absurd) & (absolute(log_scale[2]) < absurd) & (g.det > zero) &
-                  (inv_det > zero) & (g.u + extent_x >= zero) & (g.v + extent_y >= zero) &
-                  (g.u - extent_x <= Lanes(static_cast<float>(width - 1))) &
-                  (g.v - extent_y <= Lanes(static_cast<float>(height - 1)));
-    const size_t left = static_cast<size_t>(block.count) - lane;
-    ok = ok & LaneMask{hn::FirstN(kFloats, std::min(left, kLanes))};
-    if (hn::AllFalse(kFloats, ok.m)) continue;
-    ok = ok & colors(block, g.offset, degree, lane, rgb);
-
-    store(g.u, rows[0] + lane);
-    store(g.v, rows[1] + lane);
-    store(g.b * inv_c, rows[2] + lane);
-    store(-half_log2e * g.c * inv_det, rows[3] + lane);
-    store(-half_log2e * inv_c, rows[4] + lane);
-    store(log2_opacity, rows[5] + lane);
-    for (size_t c = 0; c < 3; ++c) store(rgb[c], rows[6 + c] + lane);
-    store(g.p[2], rows[9] + lane);
-    store(cut, rows[10] + lane);
-    store(g.det * inv_c / half_log2e, rows[11] + lane);
-    store(g.b * extent_x / g.a, rows[12] + lane);
-    store(extent_x, rows[13] + lane);
-    store(extent_y, rows[14] + lane);
+  const Lanes absurd(kAbsurd);
+  for (size_t i = 0; i < kBlockSize / kLanes; ++i) {
+    if (((parts >> i) & 1) == 0) continue;
+    LaneMask ok{masks[i]};
+    for (size_t c = 0; c < 3; ++c) {
+      float* at = rows[kRgb + c] + i * kLanes;
+      ok = ok & (absolute(load(at)) < absurd);
+      store(maximum(load(at), Lanes(0.0f)), at);
+    }
     uint8_t bits[8] = {};
     hn::StoreMaskBits(kFloats, ok.m, bits);
-    visible |= static_cast<uint64_t>(bits[0] | (bits[1] << 8)) << lane;
+    visible |= static_cast<uint64_t>(bits[0] | (bits[1] << 8)) << (i * kLanes);
   }
   for (uint64_t rest = visible; rest != 0; rest &= rest - 1) {
     const int lane = std::countr_zero(rest);
     float* splat = &splats[lane].u;
-    for (int i = 0; i < 15; ++i) splat[i] = rows[i][lane];
+    for (int i = 0; i < kSplatRows; ++i) splat[i] = rows[i][lane];
   }
   return visible;
 }
@@ -151,51 +197,46 @@ bool block_in_view(const Block& block, const AnchorView& view, const Frame& fram
          !outside(view.fy, view.cy, static_cast<float>(frame.height), p[1], view.min_y, view.max_y);
 }
 
-/// Calls emit(tile) for the tiles with a pixel inside the splat's cut ellipse, row by row.
-template <class Emit>
-void for_each_tile(const Splat& s, const Frame& frame, Emit&& emit) {
-  // Ceiling and floor of values clamped to the image first: conversion truncates, and the library calls are slow.
-  const auto first = [](float from) {
-    const float clamped = std::clamp(from, 0.0f, 1e6f);
-    const int truncated = static_cast<int>(clamped);
-    return truncated + (clamped > static_cast<float>(truncated) ? 1 : 0);
-  };
-  const auto last = [](float to, int size) {
-    return static_cast<int>(std::clamp(to, -1.0f, static_cast<float>(size - 1)) + 1.0f) - 1;
-  };
-  const int x0 = first(s.u - s.extent_x), x1 = last(s.u + s.extent_x, frame.width);
-  const int y0 = first(s.v - s.extent_y), y1 = last(s.v + s.extent_y, frame.height);
-  if (x0 > x1 || y0 > y1) return;
-  const int tx0 = x0 / kTileSize, tx1 = x1 / kTileSize, ty0 = y0 / kTileSize, ty1 = y1 / kTileSize;
-  for (int ty = ty0; ty <= ty1; ++ty) {
-    int from = tx0, to = tx1;
-    if (tx0 != tx1 && ty0 != ty1) {
+/// Appends the tiles with a pixel inside the splat's cut ellipse, row by row.
+void append_tiles(const Splat& s, const Frame& frame, const TileBoxes& boxes, size_t lane,
+                  std::vector<uint32_t>& tiles) {
+  const int left = boxes.left[lane], right = boxes.right[lane], top = boxes.top[lane], bottom = boxes.bottom[lane];
+  const bool one_column = left == right, one_row = top == bottom;
+  for (int ty = top; ty <= bottom; ++ty) {
+    int from = left, to = right;
+    if (!one_column && !one_row) {
       // The span of the ellipse over the tile's rows of pixel centres.
       const float low = std::max(static_cast<float>(ty * kTileSize) - s.v, -s.extent_y);
       const float high = std::min(static_cast<float>(ty * kTileSize + kTileSize - 1) - s.v, s.extent_y);
       const auto edge = [&](float side) {
         const float dy = std::clamp(side * s.peak_dy, low, high);
-        return s.u + s.slope * dy + side * (std::sqrt(std::max(0.0f, (s.cut + s.kc * dy * dy) * s.inv_ka)) + 1e-3f);
+        const float x =
+            s.u + s.slope * dy + side * (std::sqrt(std::max(0.0f, (s.cut + s.kc * dy * dy) * s.inv_ka)) + 1e-3f);
+        return std::clamp(x, -1.0f, static_cast<float>(frame.width - 1));
       };
-      from = std::max(tx0, first(edge(-1)) / kTileSize);
-      to = std::min(tx1, last(edge(1), frame.width) / kTileSize);
+      // Conversion truncates; the library's ceiling and floor are slow.
+      const float begin = std::max(edge(-1), 0.0f);
+      const int truncated = static_cast<int>(begin);
+      from = std::max(left, (truncated + (begin > static_cast<float>(truncated) ? 1 : 0)) / kTileSize);
+      to = std::min(right, (static_cast<int>(edge(1) + 1.0f) - 1) / kTileSize);
     }
-    for (int tx = from; tx <= to; ++tx) emit(static_cast<uint32_t>(ty * frame.tiles_x + tx));
+    for (int tx = from; tx <= to; ++tx) tiles.push_back(static_cast<uint32_t>(ty * frame.tiles_x + tx));
   }
 }
 
 void project_rank(const GaussianModel& model, Frame& frame, size_t rank, std::vector<uint32_t>& tiles) {
   const Block& block = model.block(frame.blocks[rank]);
-  if (rank + 1 < frame.blocks.size()) prefetch_parameters(model.block(frame.blocks[rank + 1]), frame.sh_degree);
+  const Block* next = rank + 1 < frame.blocks.size() ? &model.block(frame.blocks[rank + 1]) : nullptr;
   const AnchorView& view = frame.anchors[static_cast<size_t>(block.anchor)];
   Splat* splats = &frame.splats[rank * kBlockSize];
+  TileBoxes boxes;
   const uint64_t candidates =
-      HWY_DYNAMIC_DISPATCH(project_block)(block, view, frame.width, frame.height, frame.sh_degree, splats);
+      HWY_DYNAMIC_DISPATCH(project_block)(block, view, frame.width, frame.height, frame.sh_degree, next, splats, boxes);
   uint64_t visible = 0;
   for (uint64_t rest = candidates; rest != 0; rest &= rest - 1) {
     const size_t lane = static_cast<size_t>(std::countr_zero(rest));
     const size_t first = tiles.size();
-    for_each_tile(splats[lane], frame, [&](uint32_t tile) { tiles.push_back(tile); });
+    append_tiles(splats[lane], frame, boxes, lane, tiles);
     if (tiles.size() == first) continue;
     visible |= uint64_t{1} << lane;
     frame.instances[rank * kBlockSize + lane] = {static_cast<uint32_t>(first),
