@@ -44,7 +44,8 @@ inline constexpr size_t kPad = 16;
 inline constexpr int kSignals = 4;      ///< Filtered forwards: a, b, a² + b², a b.
 inline constexpr int kDerivatives = 3;  ///< Filtered backwards: dS/d(mean a), dS/d(mean a²), dS/d(mean ab).
 
-constexpr size_t padded_width(int width) { return (static_cast<size_t>(width) + 15) / 16 * 16 + 2 * kPad; }
+/// Floats from row to row: an odd number of cache lines, so that the rows above each other do not share cache sets.
+constexpr size_t padded_width(int width) { return (((static_cast<size_t>(width) + 15) / 16 + 2 * kPad / 16) | 1) * 16; }
 /// Floats of scratch memory for one band.
 constexpr size_t scratch_size(int width) {
   return padded_width(width) * static_cast<size_t>(kSignals + kDerivatives) * (kWindow + 1);
@@ -261,8 +262,9 @@ namespace {
 HWY_EXPORT(ssim_band);
 HWY_EXPORT(l1_band);
 
-/// Tall enough that the 20 rows computed twice between neighbours do not matter, low enough to share the work.
-constexpr int kBandRows = 96;
+/// Bands per channel: tall enough that the 20 rows computed twice between neighbours matter little, an even number to
+/// share the work. Depends on the image alone, so that sums do not depend on the number of threads.
+int num_bands(int height) { return height < 64 ? 1 : 2 * ((height + 383) / 384); }
 
 }  // namespace
 
@@ -272,14 +274,14 @@ PhotometricLoss LossFunction::evaluate(std::span<const float> rgb, const TargetI
   const size_t plane = static_cast<size_t>(width) * static_cast<size_t>(height);
   PHOTOSLAM_CHECK(rgb.size() == 3 * plane && plane > 0, "render of {} values, target {}x{}", rgb.size(), width, height);
   dl_drgb.resize(3 * plane);
-  const int bands = (height + kBandRows - 1) / kBandRows;
+  const int bands = num_bands(height), band_rows = (height + bands - 1) / bands;
   const double values = 3.0 * std::max(target.num_valid(), 1);
   std::vector<LossSums> sums(static_cast<size_t>(3 * bands));
   const size_t slice = (scratch_size(width) + 15) / 16 * 16;
   scratch_.reserve(slice * static_cast<size_t>(executor.concurrency()));
   executor.for_each(3 * bands, [&](int task, int worker) {
     const size_t c = static_cast<size_t>(task / bands);
-    const int begin = (task % bands) * kBandRows;
+    const int begin = (task % bands) * band_rows;
     const LossBand band{.render = rgb.data() + c * plane,
                         .target = target.planes().data() + c * plane,
                         .mask = target.has_mask() ? target.mask().data() : nullptr,
@@ -287,7 +289,7 @@ PhotometricLoss LossFunction::evaluate(std::span<const float> rgb, const TargetI
                         .width = width,
                         .height = height,
                         .begin = begin,
-                        .end = std::min(begin + kBandRows, height),
+                        .end = std::min(begin + band_rows, height),
                         .gain = exposure.gain[c],
                         .bias = exposure.bias[c],
                         .l1_scale = static_cast<float>((1 - static_cast<double>(ssim_weight)) / values),

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "splatting/cpu/rasterize.h"
 #include "splatting/cpu/targets.h"
@@ -22,37 +23,51 @@ struct alignas(64) CellGradientState {
   float running[kCellPixels];  ///< Product of all 1 − alpha so far, as in the forward pass.
   float behind[kCellPixels];
   float rgb[3][kCellPixels];  ///< dL/d(colour of the pixel)
-  float depth[kCellPixels];   ///< dL/d(depth of the pixel)
 };
 
-/// One cell more than the tile has: what is blended there does not count.
-using TileGradientState = CellGradientState[65];
+/// Depths apart: without them what a tile needs stays in the first-level cache.
+struct TileGradientState {
+  CellGradientState cells[64];
+  alignas(64) float depth[64][kCellPixels];  ///< dL/d(depth of the pixel)
+};
 
-HWY_INLINE void read_pixel(const RenderResult& image, const ImageGradient& gradient, size_t plane, size_t pixel, int at,
-                           CellGradientState& cell) {
-  float behind = 0;
-  for (size_t k = 0; k < 3; ++k) {
-    const float g = gradient.rgb[k * plane + pixel];
-    cell.rgb[k][at] = g;
-    behind += g * image.rgb[k * plane + pixel];
-  }
-  cell.depth[at] = gradient.depth.empty() ? 0.0f : gradient.depth[pixel];
-  behind += cell.depth[at] * image.depth[pixel];
-  if (!gradient.alpha.empty()) behind -= gradient.alpha[pixel] * (1.0f - image.alpha[pixel]);
-  cell.behind[at] = behind;
-  cell.running[at] = 1.0f;
+/// Reads `count` <= 4 pixels of one row of a cell.
+HWY_INLINE void read_pixels(const RenderResult& image, const ImageGradient& gradient, size_t plane, size_t pixel,
+                            int count, int at, CellGradientState& cell, float* depth) {
+  float behind[kCellSize] = {}, g[kCellSize], value[kCellSize];
+  const auto add = [&](const float* gradients, const float* values, float* out) {
+    if (count == kCellSize) {
+      std::memcpy(g, gradients + pixel, sizeof(g));
+      std::memcpy(value, values + pixel, sizeof(value));
+      for (int i = 0; i < kCellSize; ++i) behind[i] += g[i] * value[i];
+      std::memcpy(out + at, g, sizeof(g));
+    } else {
+      for (int i = 0; i < count; ++i)
+        behind[i] += gradients[pixel + static_cast<size_t>(i)] * values[pixel + static_cast<size_t>(i)];
+      std::copy_n(gradients + pixel, count, out + at);
+    }
+  };
+  for (size_t k = 0; k < 3; ++k) add(&gradient.rgb[k * plane], &image.rgb[k * plane], cell.rgb[k]);
+  if (!gradient.depth.empty()) add(gradient.depth.data(), image.depth.data(), depth);
+  if (!gradient.alpha.empty())
+    for (size_t i = 0; i < static_cast<size_t>(count); ++i)
+      behind[i] -= gradient.alpha[pixel + i] * (1.0f - image.alpha[pixel + i]);
+  std::copy_n(behind, count, cell.behind + at);
+  std::fill_n(cell.running + at, count, 1.0f);
 }
 
 void begin_gradient_tile(const Frame& frame, int x0, int y0, const RenderResult& image, const ImageGradient& gradient,
                          TileGradientState& state) {
   const int columns = std::min(kTileSize, frame.width - x0), rows = std::min(kTileSize, frame.height - y0);
   const size_t plane = static_cast<size_t>(frame.width) * static_cast<size_t>(frame.height);
-  for (CellGradientState& cell : state) cell = CellGradientState{};
+  if (columns < kTileSize || rows < kTileSize) state = TileGradientState{};
   for (int y = 0; y < rows; ++y) {
     const size_t in = static_cast<size_t>(y0 + y) * static_cast<size_t>(frame.width) + static_cast<size_t>(x0);
-    for (int x = 0; x < columns; ++x)
-      read_pixel(image, gradient, plane, in + static_cast<size_t>(x), y % kCellSize * kCellSize + x % kCellSize,
-                 state[y / kCellSize * kCellsPerRow + x / kCellSize]);
+    for (int x = 0; x < columns; x += kCellSize) {
+      const int cell = y / kCellSize * kCellsPerRow + x / kCellSize;
+      read_pixels(image, gradient, plane, in + static_cast<size_t>(x), std::min(kCellSize, columns - x),
+                  y % kCellSize * kCellSize, state.cells[cell], state.depth[cell]);
+    }
   }
 }
 
@@ -100,55 +115,49 @@ struct RecordLanes {
   }
 };
 
-inline constexpr size_t kMaxPairs = 128;
+inline constexpr size_t kMaxPairs = 64;  ///< At least the cells of a tile.
 inline constexpr size_t kGroupCells = kGroupVectors / kVectorsPerCell;
 static_assert(kGroupCells >= 1);
 
 /// (splat, cell) pairs in blending order, and what can be known of them before blending.
 struct Pairs {
   size_t count = 0;
-  uint8_t entries[kMaxPairs + kGroupCells];  ///< Index into the batch.
-  uint8_t cells[kMaxPairs + kGroupCells];
+  uint16_t items[kMaxPairs + kGroupCells];                           ///< 64 * index into the batch + cell.
   alignas(64) float alpha[(kMaxPairs + kGroupCells) * kCellPixels];  ///< Clamped.
-  alignas(64) float odds[(kMaxPairs + kGroupCells) * kCellPixels];   ///< alpha / (1 − alpha); −1 where clamped.
 
-  HWY_INLINE bool has_room() const { return count + 64 <= kMaxPairs; }
+  HWY_INLINE bool has_room(uint64_t mask) const { return count + hwy::PopCount(mask) <= kMaxPairs; }
   HWY_INLINE void append(size_t entry, uint64_t mask) {
-    for (; mask != 0; mask &= mask - 1) {
-      entries[count] = static_cast<uint8_t>(entry);
-      cells[count++] = static_cast<uint8_t>(hwy::Num0BitsBelowLS1Bit_Nonzero64(mask));
-    }
+    size_t n = count;
+    for (; mask != 0; mask &= mask - 1)
+      items[n++] = static_cast<uint16_t>(64 * entry + hwy::Num0BitsBelowLS1Bit_Nonzero64(mask));
+    count = n;
   }
+  size_t entry(size_t pair) const { return items[pair] / 64; }
+  size_t cell(size_t pair) const { return items[pair] % 64; }
 };
 
-/// Fills in alpha and odds of all pairs, in lockstep groups.
+/// Fills in alpha of all pairs, in lockstep groups.
 HWY_INLINE void cover_pairs(const Splat* batch, Pairs& pairs) {
-  std::fill_n(pairs.entries + pairs.count, kGroupCells, uint8_t{0});
-  std::fill_n(pairs.cells + pairs.count, kGroupCells, uint8_t{0});
-  const Vec one = hn::Set(kFloats, 1.0f), max_alpha = hn::Set(kFloats, kMaxAlpha), minus_one = hn::Set(kFloats, -1.0f);
+  std::fill_n(pairs.items + pairs.count, kGroupCells, uint16_t{0});
+  const Vec max_alpha = hn::Set(kFloats, kMaxAlpha);
   for (size_t i = 0; i < pairs.count; i += kGroupCells) {
     const Splat* splats[kGroupVectors];
-    Vec t[kGroupVectors], dy[kGroupVectors], raw[kGroupVectors], alpha[kGroupVectors], odds[kGroupVectors];
+    Vec t[kGroupVectors], dy[kGroupVectors], alpha[kGroupVectors];
     for (size_t k = 0; k < kGroupVectors; ++k) {
-      const size_t pair = i + k / kVectorsPerCell, part = k % kVectorsPerCell, cell = pairs.cells[pair];
-      splats[k] = &batch[pairs.entries[pair]];
+      const size_t pair = i + k / kVectorsPerCell, part = k % kVectorsPerCell, cell = pairs.cell(pair);
+      splats[k] = &batch[pairs.entry(pair)];
       locate(*splats[k], cell_x(cell, part), cell_y(cell, part), t[k], dy[k]);
     }
-    alpha_group(splats, t, dy, raw);
-    for (size_t k = 0; k < kGroupVectors; ++k) alpha[k] = hn::Min(raw[k], max_alpha);
-    for (size_t k = 0; k < kGroupVectors; ++k) odds[k] = hn::Mul(alpha[k], reciprocal(hn::Sub(one, alpha[k])));
-    for (size_t k = 0; k < kGroupVectors; ++k) {
-      const Vec value = hn::IfThenElse(hn::Gt(raw[k], max_alpha), minus_one, odds[k]);
-      hn::Store(alpha[k], kFloats, pairs.alpha + i * kCellPixels + k * kLanes);
-      hn::Store(value, kFloats, pairs.odds + i * kCellPixels + k * kLanes);
-    }
+    alpha_group(splats, t, dy, alpha);
+    for (size_t k = 0; k < kGroupVectors; ++k)
+      hn::Store(hn::Min(alpha[k], max_alpha), kFloats, pairs.alpha + i * kCellPixels + k * kLanes);
   }
 }
 
 template <bool kDepth>
-HWY_INLINE void unblend(const Splat& splat, uint8_t cell, size_t part, Vec alpha, Vec odds, TileGradientState& tile,
+HWY_INLINE void unblend(const Splat& splat, size_t cell, size_t part, Vec alpha, TileGradientState& tile,
                         RecordLanes& sums) {
-  CellGradientState& state = tile[cell];
+  CellGradientState& state = tile.cells[cell];
   const size_t at = part * kLanes;
   const Vec before = hn::Load(kFloats, state.running + at);
   const Vec after = hn::NegMulAdd(alpha, before, before);
@@ -160,14 +169,15 @@ HWY_INLINE void unblend(const Splat& splat, uint8_t cell, size_t part, Vec alpha
   value = hn::MulAdd(gg, hn::Set(kFloats, splat.rgb[1]), value);
   value = hn::MulAdd(gb, hn::Set(kFloats, splat.rgb[2]), value);
   if constexpr (kDepth) {
-    const Vec gz = hn::Load(kFloats, state.depth + at);
+    const Vec gz = hn::Load(kFloats, tile.depth[cell] + at);
     value = hn::MulAdd(gz, hn::Set(kFloats, splat.z), value);
     sums.z = hn::MulAdd(weight, gz, sums.z);
   }
   const Vec behind = hn::NegMulAdd(weight, value, hn::Load(kFloats, state.behind + at));
   hn::Store(behind, kFloats, state.behind + at);
   // h = dL/d(ln alpha) = weight value − behind alpha / (1 − alpha); a clamped alpha does not follow its exponent.
-  const Mask moves = hn::And(blends, hn::Ge(odds, hn::Zero(kFloats)));
+  const Mask moves = hn::And(blends, hn::Lt(alpha, hn::Set(kFloats, kMaxAlpha)));
+  const Vec odds = hn::Mul(alpha, reciprocal(hn::Sub(hn::Set(kFloats, 1.0f), alpha)));
   const Vec h = hn::IfThenElseZero(moves, hn::NegMulAdd(behind, odds, hn::Mul(weight, value)));
   Vec t, dy;
   locate(splat, cell_x(cell, part), cell_y(cell, part), t, dy);
@@ -194,11 +204,10 @@ HWY_INLINE void unblend_pairs(Frame& frame, const TileEntry* entries, size_t fir
   size_t pair = 0;
   for (size_t i = first; i < last; ++i) {
     RecordLanes sums;
-    for (; pair < pairs.count && pairs.entries[pair] == i; ++pair)
+    for (; pair < pairs.count && pairs.entry(pair) == i; ++pair)
       for (size_t part = 0; part < kVectorsPerCell; ++part) {
         const size_t at = pair * kCellPixels + part * kLanes;
-        unblend<kDepth>(batch[i], pairs.cells[pair], part, hn::Load(kFloats, pairs.alpha + at),
-                        hn::Load(kFloats, pairs.odds + at), state, sums);
+        unblend<kDepth>(batch[i], pairs.cell(pair), part, hn::Load(kFloats, pairs.alpha + at), state, sums);
       }
     sums.reduce(frame.gradients[entries[i].instance]);
   }
@@ -216,11 +225,12 @@ HWY_INLINE void unblend_entries(Frame& frame, uint32_t begin, uint32_t end, int 
     size_t first = 0;
     for (size_t i = 0; i < count; ++i) {
       __builtin_prefetch(&frame.gradients[entries[i].instance], 1);
-      if (!pairs.has_room()) {
+      const uint64_t mask = frame.cell_masks[begin + i];
+      if (!pairs.has_room(mask)) {
         unblend_pairs<kDepth>(frame, entries, first, i, batch, pairs, state);
         first = i;
       }
-      pairs.append(i, frame.cell_masks[begin + i]);
+      pairs.append(i, mask);
     }
     unblend_pairs<kDepth>(frame, entries, first, count, batch, pairs, state);
     begin += static_cast<uint32_t>(count);
