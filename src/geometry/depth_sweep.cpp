@@ -3,35 +3,37 @@
 #include "geometry/depth_sweep.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <vector>
 
 #include "base/check.h"
+#include "geometry/sweep_kernels.h"
 
 namespace photoslam {
 namespace {
 
-constexpr int kCensusBits = 24;
-constexpr int kCostScale = 4;  // costs are small integers: bits of the signature times this
-constexpr int kUnknownCost = kCostScale * kCensusBits / 2;
-constexpr int kCensusRadius = 2;
-constexpr int kLanes = 16;  // hypotheses are padded to whole vectors
+using internal::follow_path;
+using internal::kCostScale;
+using internal::kPlaneLanes;
+using internal::kSignatureBits;
+using internal::kSignatureRadius;
+using internal::match_row;
+using internal::SweepRow;
 
 using Signatures = Image<uint32_t>;
 
 /// One bit for each of the 24 neighbours: is it darker than the centre?
 Signatures census(const ImageU8& grey) {
   Signatures result(grey.width(), grey.height());
-  for (int y = kCensusRadius; y < grey.height() - kCensusRadius; ++y) {
+  for (int y = kSignatureRadius; y < grey.height() - kSignatureRadius; ++y) {
     uint32_t* const target = result.row(y);
-    for (int dy = -kCensusRadius; dy <= kCensusRadius; ++dy) {
+    for (int dy = -kSignatureRadius; dy <= kSignatureRadius; ++dy) {
       const uint8_t* const centre = grey.row(y);
       const uint8_t* const other = grey.row(y + dy);
-      for (int dx = -kCensusRadius; dx <= kCensusRadius; ++dx) {
+      for (int dx = -kSignatureRadius; dx <= kSignatureRadius; ++dx) {
         if (dx == 0 && dy == 0) continue;
-        for (int x = kCensusRadius; x < grey.width() - kCensusRadius; ++x) {
+        for (int x = kSignatureRadius; x < grey.width() - kSignatureRadius; ++x) {
           target[x] = 2 * target[x] + (other[x + dx] < centre[x] ? 1u : 0u);
         }
       }
@@ -59,7 +61,7 @@ struct Transfer {
 /// The planes, and what each pixel pays for lying on each.
 struct Sweep {
   double nearest = 0, farthest = 0;  // inverse depths of the last and of the first plane [1/m]
-  int planes = 0;                    // a multiple of kLanes
+  int planes = 0;                    // a multiple of kPlaneLanes
   int width = 0, height = 0;
   std::vector<int16_t> cost;   // [H, W, planes] matching costs
   std::vector<int16_t> total;  // [H, W, planes] summed along the directions
@@ -84,49 +86,16 @@ double longest_path(const PinholeCamera& camera, std::span<const SweepView> view
   return longest;
 }
 
-void match_row(Sweep& sweep, int y, const Signatures& reference, std::span<const Signatures> signatures,
-               std::span<const Transfer> transfers) {
-  std::vector<int> sum(static_cast<size_t>(sweep.planes)), seen(static_cast<size_t>(sweep.planes));
-  for (int x = 0; x < sweep.width; ++x) {
-    std::ranges::fill(sum, 0);
-    std::ranges::fill(seen, 0);
-    for (size_t v = 0; v < transfers.size(); ++v) {
-      const Eigen::Vector3f base = (transfers[v].linear * Vec3(x, y, 1)).cast<float>();
-      const Eigen::Vector3f offset = transfers[v].offset.cast<float>();
-      const Signatures& other = signatures[v];
-      const auto limit_x = static_cast<float>(other.width() - 1 - kCensusRadius);
-      const auto limit_y = static_cast<float>(other.height() - 1 - kCensusRadius);
-      for (int k = 0; k < sweep.planes; ++k) {
-        const auto w = static_cast<float>(sweep.inverse_depth(k));
-        const float z = base.z() + w * offset.z();
-        if (!(z > 0)) continue;
-        const float px = (base.x() + w * offset.x()) / z + 0.5f, py = (base.y() + w * offset.y()) / z + 0.5f;
-        if (!(px >= kCensusRadius && py >= kCensusRadius && px < limit_x + 1 && py < limit_y + 1)) continue;
-        const auto i = static_cast<size_t>(k);
-        sum[i] += std::popcount(reference(x, y) ^ other(static_cast<int>(px), static_cast<int>(py)));
-        ++seen[i];
-      }
-    }
-    int16_t* const cost = sweep.cost.data() + sweep.at(x, y);
-    for (size_t k = 0; k < sum.size(); ++k) {
-      cost[k] = static_cast<int16_t>(seen[k] > 0 ? kCostScale * sum[k] / seen[k] : kUnknownCost);
-    }
+/// Row y of the reference, on its way into a view.
+SweepRow sweep_row(const Transfer& transfer, const Signatures& signatures, int y) {
+  SweepRow row{.signatures = signatures.row(0), .width = signatures.width(), .height = signatures.height()};
+  const Vec3 start = transfer.linear * Vec3(0, y, 1);
+  for (int i = 0; i < 3; ++i) {
+    row.start[i] = static_cast<float>(start[i]);
+    row.step[i] = static_cast<float>(transfer.linear(i, 0));
+    row.offset[i] = static_cast<float>(transfer.offset[i]);
   }
-}
-
-/// One step of the recurrence along a direction: `previous` holds the path costs of the pixel before, with a border of
-/// one on either side; `path` receives those of this pixel.
-void follow(int planes, const int16_t* cost, const int16_t* previous, int16_t small_penalty, int16_t large_penalty,
-            int16_t* path, int16_t* total) {
-  int16_t least = previous[0];
-  for (int k = 1; k < planes; ++k) least = std::min(least, previous[k]);
-  const auto jump = static_cast<int16_t>(least + large_penalty);
-  for (int k = 0; k < planes; ++k) {
-    const auto beside = static_cast<int16_t>(std::min(previous[k - 1], previous[k + 1]) + small_penalty);
-    const int16_t best = std::min(std::min(previous[k], beside), jump);
-    path[k] = static_cast<int16_t>(cost[k] + best - least);
-    total[k] = static_cast<int16_t>(total[k] + path[k]);
-  }
+  return row;
 }
 
 /// Sums path costs along `count` lines of `length` pixels: line i starts at (x0, y0) + i (lx, ly) and runs by (dx, dy).
@@ -141,12 +110,13 @@ void aggregate(Sweep& sweep, const Direction& direction, int16_t small_penalty, 
     const auto planes = static_cast<size_t>(sweep.planes);
     std::vector<int16_t> previous(planes + 2, 0), path(planes + 2, 0);
     previous.front() = previous.back() = path.front() = path.back() = kNever;
+    int16_t least = 0;
     for (int i = 0; i < direction.length; ++i) {
       const int x = direction.x0 + line * direction.lx + i * direction.dx;
       const int y = direction.y0 + line * direction.ly + i * direction.dy;
       const size_t at = sweep.at(x, y);
-      follow(sweep.planes, sweep.cost.data() + at, previous.data() + 1, small_penalty, large_penalty, path.data() + 1,
-             sweep.total.data() + at);
+      least = follow_path(sweep.planes, sweep.cost.data() + at, previous.data() + 1, least, small_penalty,
+                          large_penalty, path.data() + 1, sweep.total.data() + at);
       std::swap(previous, path);
     }
   });
@@ -154,11 +124,11 @@ void aggregate(Sweep& sweep, const Direction& direction, int16_t small_penalty, 
 
 /// The best plane of each pixel, between planes by a parabola; negative where the match is poor or ambiguous.
 ImageF choose_planes(const DepthSweepOptions& options, const Sweep& sweep, int num_directions) {
-  const auto max_cost = static_cast<int16_t>(options.max_cost * kCostScale * kCensusBits);
-  const auto margin = static_cast<int>(options.min_margin * kCostScale * kCensusBits * num_directions);
+  const auto max_cost = static_cast<int16_t>(options.max_cost * kCostScale * kSignatureBits);
+  const auto margin = static_cast<int>(options.min_margin * kCostScale * kSignatureBits * num_directions);
   ImageF plane(sweep.width, sweep.height, 1, -1.0f);
-  for (int y = kCensusRadius; y < sweep.height - kCensusRadius; ++y) {
-    for (int x = kCensusRadius; x < sweep.width - kCensusRadius; ++x) {
+  for (int y = kSignatureRadius; y < sweep.height - kSignatureRadius; ++y) {
+    for (int x = kSignatureRadius; x < sweep.width - kSignatureRadius; ++x) {
       const int16_t* const total = sweep.total.data() + sweep.at(x, y);
       const auto best = static_cast<int>(std::min_element(total, total + sweep.planes) - total);
       if (sweep.cost[sweep.at(x, y) + static_cast<size_t>(best)] > max_cost) continue;
@@ -229,7 +199,7 @@ ImageF sweep_depth(const DepthSweepOptions& options, const ImageU8& grey, const 
   sweep.height = camera.height;
   const double path = longest_path(camera, views, sweep.farthest, sweep.nearest);
   const int wanted = std::clamp(static_cast<int>(std::ceil(path)) + 1, 2, options.max_hypotheses);
-  sweep.planes = (wanted + kLanes - 1) / kLanes * kLanes;
+  sweep.planes = (wanted + kPlaneLanes - 1) / kPlaneLanes * kPlaneLanes;
   ImageF depth(camera.width, camera.height);
   if (path < 2) return depth;  // nothing can be told apart
 
@@ -242,12 +212,20 @@ ImageF sweep_depth(const DepthSweepOptions& options, const ImageU8& grey, const 
   const Signatures reference = census(grey);
   sweep.cost.resize(sweep.at(0, sweep.height));
   sweep.total.assign(sweep.cost.size(), 0);
-  executor.for_each(sweep.height, [&](int y, int) { match_row(sweep, y, reference, signatures, transfers); });
+  std::vector<float> inverse_depths;
+  for (int k = 0; k < sweep.planes; ++k) inverse_depths.push_back(static_cast<float>(sweep.inverse_depth(k)));
+  executor.for_each(sweep.height, [&](int y, int) {
+    std::vector<SweepRow> rows;
+    for (size_t v = 0; v < transfers.size(); ++v) rows.push_back(sweep_row(transfers[v], signatures[v], y));
+    match_row(reference.row(y), sweep.width, inverse_depths, rows, sweep.cost.data() + sweep.at(0, y));
+  });
 
   const int w = sweep.width, h = sweep.height;
   const Direction directions[] = {
       {0, 0, 0, 1, 1, 0, h, w}, {w - 1, 0, 0, 1, -1, 0, h, w}, {0, 0, 1, 0, 0, 1, w, h}, {0, h - 1, 1, 0, 0, -1, w, h}};
-  const auto penalty = [](double share) { return static_cast<int16_t>(std::lround(share * kCostScale * kCensusBits)); };
+  const auto penalty = [](double share) {
+    return static_cast<int16_t>(std::lround(share * kCostScale * kSignatureBits));
+  };
   for (const Direction& direction : directions) {
     aggregate(sweep, direction, penalty(options.small_penalty), penalty(options.large_penalty), executor);
   }

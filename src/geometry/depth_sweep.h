@@ -13,7 +13,7 @@
 namespace photoslam {
 
 struct DepthSweepOptions {
-  int max_hypotheses = 96;
+  int max_hypotheses = 64;
   double small_penalty = 0.06;
   double large_penalty = 0.35;
   double max_cost = 0.30;

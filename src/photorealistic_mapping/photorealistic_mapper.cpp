@@ -122,7 +122,8 @@ void PhotorealisticMapper::sweep_picture(const MapSnapshot& map, size_t index, E
     right_from_left.translation.x() = -sensor_.stereo_baseline_m;
     others.push_back({&view.right, view.picture.camera, right_from_left});
   }
-  const auto neighbours = sweep_neighbours(options_.depth, map, id, KeyframeId(static_cast<int32_t>(views_.size())));
+  auto neighbours = sweep_neighbours(options_.depth, map, id, KeyframeId(static_cast<int32_t>(views_.size())));
+  if (!others.empty() && !neighbours.empty()) neighbours.pop_back();  // the right image does for one of them
   std::vector<ImageU8> pictures;
   pictures.reserve(neighbours.size());
   for (const KeyframeId neighbour : neighbours) {
