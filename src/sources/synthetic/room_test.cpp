@@ -29,7 +29,7 @@ double largest_depth_error(const SyntheticRoom& room, const SE3& world_from_came
   // Narrow, and with a principal point far off the centre.
   const PinholeCamera camera{.width = 70, .height = 49, .fx = 310, .fy = 290, .cx = 22.3, .cy = 31.8};
   SerialExecutor serial;
-  const RoomView view = room.render(world_from_camera, camera, serial);
+  const SceneView view = room.render(world_from_camera, camera, serial);
   double worst = 0;
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
@@ -44,7 +44,7 @@ double largest_depth_error(const SyntheticRoom& room, const SE3& world_from_came
 
 TEST(SyntheticRoom, DepthOfBareSurfacesIsTheClosedForm) {
   ThreadPool pool(2);
-  const SyntheticRoom room(1, pool, RoomQuality::draft);
+  const SyntheticRoom room(1, pool, SceneQuality::draft);
   // Floor in the east, brick wall above the pin board, south wall above the door.
   EXPECT_LT(largest_depth_error(room, look({3.9, 2.5, 1.5}, {4.3, 2.1, 0}), Vec3::UnitZ(), 0), 2e-7);
   EXPECT_LT(largest_depth_error(room, look({3.0, 2.4, 1.9}, {2.7, 4.2, 2.2}), Vec3::UnitY(), 4.2), 2e-7);
@@ -53,11 +53,11 @@ TEST(SyntheticRoom, DepthOfBareSurfacesIsTheClosedForm) {
 
 TEST(SyntheticRoom, ViewsAgreeAboutTheWorld) {
   ThreadPool pool(2);
-  const SyntheticRoom room(2, pool, RoomQuality::draft);
+  const SyntheticRoom room(2, pool, SceneQuality::draft);
   const PinholeCamera camera{.width = 160, .height = 120, .fx = 131.4, .fy = 131.1, .cx = 81.7, .cy = 57.4};
   const RoomTrajectory trajectory(2, 10);
   const SE3 world_from_a = trajectory.world_from_camera(1.0), world_from_b = trajectory.world_from_camera(1.6);
-  const RoomView a = room.render(world_from_a, camera, pool), b = room.render(world_from_b, camera, pool);
+  const SceneView a = room.render(world_from_a, camera, pool), b = room.render(world_from_b, camera, pool);
   const SE3 b_from_a = world_from_b.inverse() * world_from_a;
   std::vector<double> depth_errors, light_errors;
   for (int y = 0; y < camera.height; ++y) {
@@ -85,8 +85,8 @@ TEST(SyntheticRoom, LooksTheSameAtAnyThreadCount) {
   ThreadPool pool(2);
   const PinholeCamera camera{.width = 83, .height = 61, .fx = 68, .fy = 68, .cx = 41, .cy = 30};
   const SE3 pose = RoomTrajectory(1, 10).world_from_camera(2);
-  const RoomView one = SyntheticRoom(1, serial, RoomQuality::draft).render(pose, camera, serial);
-  const RoomView two = SyntheticRoom(1, pool, RoomQuality::draft).render(pose, camera, pool);
+  const SceneView one = SyntheticRoom(1, serial, SceneQuality::draft).render(pose, camera, serial);
+  const SceneView two = SyntheticRoom(1, pool, SceneQuality::draft).render(pose, camera, pool);
   EXPECT_EQ(one.radiance, two.radiance);
   EXPECT_EQ(one.depth, two.depth);
   EXPECT_EQ(one.incidence, two.incidence);
@@ -101,7 +101,7 @@ TEST(SyntheticRoom, IsAsDetailedAsARealOne) {
   constexpr int kViews = 8;
   for (int i = 0; i < kViews; ++i) {
     // No noise: the detail is in the scene.
-    const RoomView view = room.render(trajectory.world_from_camera(10.0 * i / kViews), options.camera, pool);
+    const SceneView view = room.render(trajectory.world_from_camera(10.0 * i / kViews), options.camera, pool);
     const DetailFigures figures = measure_detail(expose(view, 0, 0, 0));
     sum.shrunk_psnr_db += figures.shrunk_psnr_db / kViews;
     sum.horizontal_difference += figures.horizontal_difference / kViews;

@@ -54,7 +54,7 @@ uint64_t row_seed(uint64_t seed, int y) {
 
 }  // namespace
 
-ImageU8 expose(const RoomView& view, double exposure_ev, double noise, uint64_t noise_seed) {
+ImageU8 expose(const SceneView& view, double exposure_ev, double noise, uint64_t noise_seed) {
   const int width = view.radiance.width(), height = view.radiance.height();
   const float gain = static_cast<float>(std::exp2(exposure_ev)), sigma = static_cast<float>(noise);
   const ToneCurve curve;
@@ -73,7 +73,7 @@ ImageU8 expose(const RoomView& view, double exposure_ev, double noise, uint64_t 
   return image;
 }
 
-ImageU16 measure_depth(const RoomView& view, double metres_per_unit, double noise, double holes, uint64_t noise_seed) {
+ImageU16 measure_depth(const SceneView& view, double metres_per_unit, double noise, double holes, uint64_t noise_seed) {
   const int width = view.depth.width(), height = view.depth.height();
   ImageU16 image(width, height);
   const auto at_edge = [&](int x, int y) {

@@ -10,7 +10,7 @@ namespace photoslam {
 namespace {
 
 /// A grey wall straight ahead.
-RoomView wall(int width, int height, float radiance, float depth) {
+SceneView wall(int width, int height, float radiance, float depth) {
   return {ImageF(width, height, 3, radiance), ImageF(width, height, 1, depth), ImageF(width, height, 1, 1.0f)};
 }
 
@@ -67,7 +67,7 @@ TEST(SensorModel, WithoutNoiseDepthIsRoundedToUnits) {
 }
 
 TEST(SensorModel, HolesAreAtEdgesAndGrazingSurfaces) {
-  RoomView view = wall(100, 80, 0.2f, 2.0f);
+  SceneView view = wall(100, 80, 0.2f, 2.0f);
   for (int y = 0; y < 80; ++y) {
     for (int x = 50; x < 100; ++x) view.depth(x, y) = 3.0f;
     view.incidence(10, y) = 0.05f;

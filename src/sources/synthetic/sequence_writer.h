@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <stop_token>
+#include <string>
 
 #include "base/executor.h"
 #include "base/result.h"
@@ -16,12 +17,21 @@ namespace photoslam {
 enum class SequenceLayout {
   tum,      ///< rgb/, depth/ (16 bit, 5000 per metre), lists of both, associations, groundtruth.txt, camera.yaml.
   replica,  ///< As rendered for NICE-SLAM: results/, traj.txt, cam_params.json (16 bit, 6553.5 per metre).
+  euroc,    ///< EuRoC ASL: mav0/cam0, cam1, state_groundtruth_estimate0; the body's axes differ from the camera's.
+  kitti,    ///< KITTI odometry: sequences/00 with image_2 and image_3 (colour), calib.txt, times.txt; poses/00.txt.
 };
 
 struct SequenceSettings {
   SequenceLayout layout = SequenceLayout::tum;
-  bool lossless_color = false;  ///< PNG instead of JPEG of quality 95; TUM layout only.
+  bool lossless_color = false;  ///< PNG instead of JPEG of quality 95; KITTI's images are always PNG.
 };
+
+/// Whether the layout can hold what the camera delivers: depth goes with tum and replica, stereo with euroc and kitti,
+/// lens distortion with tum and euroc.
+Status check_layout(SequenceLayout layout, const SyntheticOptions& options);
+
+/// Whether a sequence may be written there: the folder must not exist or be empty.
+Status check_sequence_folder(const std::filesystem::path& folder);
 
 struct SequenceSummary {
   int frames = 0;

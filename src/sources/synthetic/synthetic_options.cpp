@@ -23,6 +23,24 @@ void SyntheticOptions::visit(OptionVisitor& visitor) {
   visitor.value({"depth_holes", "", 0, 1, "Share of pixels at depth edges and grazing surfaces without a depth."},
                 depth_holes);
   visitor.value({"exposure_drift", "EV", 0, 4, "Largest slow change of the exposure."}, exposure_drift);
+  visitor.value({"exposure_jumps", "EV", 0, 4, "Height of sudden changes of the exposure, one every 1.5 s."},
+                exposure_jumps);
+  visitor.value({"shutter_s", "s", 0, 0.1, "Time the shutter is open: motion blur."}, shutter_s);
+  visitor.value({"readout_s", "s", 0, 0.1, "Time from the first to the last row: rolling shutter."}, readout_s);
+  visitor.value({"baseline_m", "m", 0.01, 10, "Distance of the two cameras of a stereo rig."}, baseline_m);
+}
+
+RightCamera right_camera(const SyntheticOptions& options) {
+  RightCamera right{options.camera, options.distortion, SE3(Quat::Identity(), Vec3(-options.baseline_m, 0, 0))};
+  if (options.distortion.none()) return right;
+  right.camera.fx *= 1.004;
+  right.camera.fy *= 1.005;
+  right.camera.cx += 0.01 * options.camera.width;
+  right.camera.cy -= 0.008 * options.camera.height;
+  right.distortion.k1 *= 1.02;
+  right.distortion.k2 *= 0.97;
+  right.right_from_left = SE3(Quat(so3_exp(Vec3(0.004, -0.006, 0.003))), Vec3(-1, 0.012, 0.02) * options.baseline_m);
+  return right;
 }
 
 }  // namespace photoslam

@@ -3,7 +3,9 @@
 #pragma once
 
 #include "base/options.h"
+#include "camera/distortion.h"
 #include "camera/pinhole.h"
+#include "sources/frame.h"
 
 namespace photoslam {
 
@@ -18,8 +20,18 @@ struct SyntheticOptions {
   double depth_noise = 0.001;   ///< σ of the depth at 1 m [m]; grows with the square of the depth.
   double depth_holes = 0.5;     ///< Share of the pixels at depth edges and grazing surfaces without a measurement.
   double exposure_drift = 0;    ///< Largest slow change of the exposure [EV, factors of two].
+  double exposure_jumps = 0;    ///< Height of sudden changes of the exposure, one every 1.5 s [EV].
+  double shutter_s = 0;         ///< Time the shutter is open [s]: motion blur.
+  double readout_s = 0;         ///< Time from the first to the last row [s]: rolling shutter.
+  SensorKind sensor = SensorKind::rgbd;
+  Distortion distortion = {};  ///< Of the lens; the right camera's differs a little.
+  double baseline_m = 0.11;    ///< Of the stereo rig.
 
   void visit(OptionVisitor& visitor);
 };
+
+/// The right camera of the rig. With a lens, it is built and mounted as exactly as real ones are: not quite the same,
+/// and not quite parallel.
+RightCamera right_camera(const SyntheticOptions& options);
 
 }  // namespace photoslam

@@ -9,43 +9,54 @@
 #include "base/executor.h"
 #include "io/trajectory_file.h"
 #include "sources/frame.h"
-#include "sources/synthetic/room.h"
-#include "sources/synthetic/room_trajectory.h"
 #include "sources/synthetic/synthetic_options.h"
+#include "sources/synthetic/world.h"
 
 namespace photoslam {
 
-/// Films the synthetic room frame by frame; any frame can be made on its own, from any thread.
+/// Films a synthetic world frame by frame; any frame can be made on its own, from any thread.
 class SyntheticCamera {
  public:
-  /// The room is shared, not copied. It should have been built with the same seed.
-  SyntheticCamera(std::shared_ptr<const SyntheticRoom> room, const SyntheticOptions& options);
+  /// The world is shared, not copied. It should have been built with the same seed.
+  SyntheticCamera(std::shared_ptr<const SyntheticWorld> world, const SyntheticOptions& options);
 
   const SyntheticOptions& options() const { return options_; }
-  /// index / frames_per_second, rounded down to nanoseconds.
+  /// index / frames_per_second, rounded down to nanoseconds: the middle of the exposure of the middle row.
   int64_t timestamp_ns(int index) const;
+  /// Pose of the (left) camera at timestamp_ns().
   SE3 world_from_camera(int index) const;
-  /// The ideal view of a frame: no noise, no holes, no exposure drift.
-  RoomView view(int index, Executor& executor) const;
+  Trajectory ground_truth() const;
+
+  /// What the sensor delivers, apart from the frames themselves.
+  SourceInfo info() const;
+
+  /// The ideal view of a frame: no noise, no holes, no exposure drift. Blur and distortion are in it.
+  SceneView view(int index, Executor& executor) const;
   /// The frame as the sensor delivers it; depth in units of kMetresPerDepthUnit.
   Frame frame(int index, Executor& executor) const;
-
-  /// Turns an ideal view of a frame into what the sensor delivers.
-  Frame sense(int index, const RoomView& ideal, double metres_per_depth_unit) const;
+  /// Turns an ideal view of a frame into what the sensor delivers; the right image of a stereo rig is rendered here.
+  Frame sense(int index, const SceneView& ideal, double metres_per_depth_unit, Executor& executor) const;
 
   static constexpr double kMetresPerDepthUnit = 1.0 / 5000.0;
 
  private:
-  std::shared_ptr<const SyntheticRoom> room_;
+  SceneView film(int index, const CameraRays& rays, const SE3& left_from_camera, Executor& executor) const;
+  double exposure_ev(int index) const;
+
+  std::shared_ptr<const SyntheticWorld> world_;
   SyntheticOptions options_;
-  RoomTrajectory trajectory_;
+  std::unique_ptr<const CameraPath> path_;
+  CameraRays rays_;
+  RightCamera right_;
+  std::optional<CameraRays> right_rays_;  ///< Stereo only.
 };
 
-/// The synthetic room as a source of frames, without files.
+/// A synthetic world as a source of frames, without files.
 class SyntheticSource final : public FrameSource {
  public:
   /// The executor must outlive the source; next() renders on it.
-  SyntheticSource(std::shared_ptr<const SyntheticRoom> room, const SyntheticOptions& options, Executor& executor);
+  SyntheticSource(std::shared_ptr<const SyntheticWorld> world, const SyntheticOptions& options, Executor& executor)
+      : camera_(std::move(world), options), executor_(executor), info_(camera_.info()) {}
 
   const SourceInfo& info() const override { return info_; }
   std::optional<Frame> next() override;
@@ -56,8 +67,5 @@ class SyntheticSource final : public FrameSource {
   SourceInfo info_;
   int next_index_ = 0;
 };
-
-/// The exact poses of the frames a source with these options delivers; for evaluation only.
-Trajectory synthetic_ground_truth(const SyntheticOptions& options);
 
 }  // namespace photoslam

@@ -8,6 +8,8 @@
 #include "io/temp_folder_test.h"
 #include "sources/ground_truth.h"
 #include "sources/open_source.h"
+#include "sources/synthetic/room.h"
+#include "sources/synthetic/room_trajectory.h"
 #include "sources/synthetic/sequence_writer.h"
 
 namespace photoslam {
@@ -24,7 +26,7 @@ SyntheticOptions small_options() {
 }
 
 std::shared_ptr<const SyntheticRoom> draft_room(Executor& executor) {
-  return std::make_shared<const SyntheticRoom>(1, executor, RoomQuality::draft);
+  return std::make_shared<const SyntheticRoom>(1, executor, SceneQuality::draft);
 }
 
 TEST(SyntheticSource, DeliversTheSameFramesAtAnyThreadCount) {
@@ -35,7 +37,7 @@ TEST(SyntheticSource, DeliversTheSameFramesAtAnyThreadCount) {
   SyntheticSource one(room, options, serial), two(room, options, pool);
   EXPECT_EQ(one.info().camera, options.camera);
   EXPECT_EQ(one.info().num_frames, 5);
-  const Trajectory truth = synthetic_ground_truth(options);
+  const Trajectory truth = SyntheticCamera(room, options).ground_truth();
   ASSERT_EQ(truth.size(), 5u);
   const int64_t times[] = {0, 33333333, 66666666, 100000000, 133333333};
   const RoomTrajectory path(1, options.seconds_per_lap);
@@ -71,7 +73,7 @@ class SequenceWriterTest : public TempFolderTest {
       const std::optional<Frame> read = (*source)->next();
       ASSERT_TRUE(read.has_value());
       ASSERT_EQ(read->defect, "");
-      const Frame made = camera.sense(i, camera.view(i, serial), metres_per_unit);
+      const Frame made = camera.sense(i, camera.view(i, serial), metres_per_unit, serial);
       EXPECT_EQ(read->timestamp_ns, made.timestamp_ns);
       EXPECT_EQ(read->depth, made.depth);
       if (lossless) {
@@ -113,6 +115,52 @@ TEST_F(SequenceWriterTest, WrittenSequencesReadBack) {
   expect_readable(folder / "compressed", camera, 1 / 5000.0, false);
   ASSERT_TRUE(write_sequence(camera, {SequenceLayout::replica, false}, folder / "replica", pool).ok());
   expect_readable(folder / "replica", camera, 1 / 6553.5, false);
+}
+
+TEST_F(SequenceWriterTest, WrittenRigsReadBack) {
+  ThreadPool pool(2);
+  SerialExecutor serial;
+  SyntheticOptions options = small_options();
+  options.num_frames = 3;
+  const auto room = draft_room(pool);
+  const auto expect_same = [&](SequenceLayout layout, const char* name) {
+    const SyntheticCamera camera(room, options);
+    const auto written = write_sequence(camera, {layout, true}, folder / name, pool);
+    ASSERT_TRUE(written.ok()) << written.error().message;
+    const auto source = open_source(folder / name).value();
+    const SourceInfo &made = camera.info(), &read = source->info();
+    EXPECT_EQ(read.sensor, options.sensor);
+    EXPECT_EQ(read.camera, made.camera);
+    EXPECT_EQ(read.distortion, made.distortion);
+    ASSERT_EQ(read.right.has_value(), made.right.has_value());
+    if (made.right) {
+      EXPECT_EQ(read.right->camera, made.right->camera);
+      EXPECT_EQ(read.right->distortion, made.right->distortion);
+      EXPECT_LT((read.right->right_from_left.inverse() * made.right->right_from_left).log().norm(), 1e-9);
+    }
+    const Trajectory truth = read_ground_truth(folder / name).value();
+    for (int i = 0; i < 3; ++i) {
+      const Frame a = source->next().value(), b = camera.frame(i, serial);
+      EXPECT_EQ(a.defect, "");
+      EXPECT_EQ(a.timestamp_ns, b.timestamp_ns);
+      EXPECT_EQ(a.color, b.color);
+      EXPECT_EQ(a.right, b.right);
+      const StampedPose& pose = truth[static_cast<size_t>(i)];
+      EXPECT_EQ(pose.timestamp_ns, b.timestamp_ns);
+      EXPECT_LT((pose.world_from_camera.inverse() * camera.world_from_camera(i)).log().norm(), 1e-8);
+    }
+  };
+  options.sensor = SensorKind::stereo;
+  expect_same(SequenceLayout::kitti, "kitti");
+  options.distortion = {-0.28, 0.07, 0.0002, -0.0003};
+  expect_same(SequenceLayout::euroc, "euroc");
+  EXPECT_FALSE(check_layout(SequenceLayout::kitti, options).ok());
+  EXPECT_FALSE(check_layout(SequenceLayout::tum, options).ok());
+  options.sensor = SensorKind::mono;
+  options.distortion = {.k1 = 0.004, .k2 = 0.002, .k3 = -0.003, .k4 = 0.0005, .model = LensModel::kannala_brandt};
+  expect_same(SequenceLayout::euroc, "euroc-mono");
+  expect_same(SequenceLayout::tum, "tum-mono");
+  EXPECT_FALSE(check_layout(SequenceLayout::replica, options).ok());
 }
 
 TEST_F(SequenceWriterTest, LeavesNothingBehindWhenItCannotFinish) {

@@ -45,6 +45,6 @@ void floor_lamp(Workshop& w, const SE3& frame);
 void shell(Workshop& w, const Vec3& size);
 
 /// Furnishes the whole room.
-RoomModel furnish_room(uint64_t seed, const Vec3& size, RoomQuality quality, Executor& executor);
+SceneModel furnish_room(uint64_t seed, const Vec3& size, SceneQuality quality, Executor& executor);
 
 }  // namespace photoslam::synthetic

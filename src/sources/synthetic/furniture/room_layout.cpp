@@ -97,7 +97,7 @@ void floor_lamp(Workshop& w, const SE3& frame) {
   w.lights.areas.push_back({.center = glow.cast<float>(), .radius = 0.24f, .radiance = Color(1.7f, 1.25f, 0.75f, 0)});
 }
 
-RoomModel furnish_room(uint64_t seed, const Vec3& size, RoomQuality quality, Executor& executor) {
+SceneModel furnish_room(uint64_t seed, const Vec3& size, SceneQuality quality, Executor& executor) {
   Workshop w(seed, quality);
   shell(w, size);
   carpet(w, place(1.2, 1.05, 0, 3), 2.5, 1.7);
@@ -126,7 +126,7 @@ RoomModel furnish_room(uint64_t seed, const Vec3& size, RoomQuality quality, Exe
   bookshelf(w, place(3.32, 0.35, 0, 180), 1.05, 0.84, 3);
   wall_things(w, size);
 
-  RoomModel model = std::move(w).finish(executor);
+  SceneModel model = std::move(w).finish(executor);
   constexpr float kWidth = 14, kHeight = 8;
   model.backdrop = Texture::paint(kWidth, kHeight, 90, garden(kWidth, kHeight, static_cast<uint32_t>(seed)), executor);
   const float x = static_cast<float>(size.x()) + 3.5f;

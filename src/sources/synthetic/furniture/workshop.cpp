@@ -6,9 +6,9 @@
 
 namespace photoslam::synthetic {
 
-Workshop::Workshop(uint64_t seed, RoomQuality quality)
-    : texture_scale_(quality == RoomQuality::full ? 1.0f : 0.3f),
-      mesh_(seed, quality == RoomQuality::full ? 1.0 : 4.0) {
+Workshop::Workshop(uint64_t seed, SceneQuality quality)
+    : texture_scale_(quality == SceneQuality::full ? 1.0f : 0.3f),
+      mesh_(seed, quality == SceneQuality::full ? 1.0 : 4.0) {
   const Finish varnish{.gloss = 0.045f, .roughness = 0.18f};
   oak = material(1.3f, 0.6f, 500, wood(rgb(0xCFA56E), rgb(0x8A5A32), this->seed()), varnish);
   walnut = material(1.3f, 0.6f, 500, wood(rgb(0x8E6242), rgb(0x3E2618), this->seed()), varnish);
@@ -45,8 +45,8 @@ int Workshop::paint(const Color& color, const Finish& finish) {
       [=](float x, float y) -> Color { return shade(color, 1 + 0.05f * fractal(x * 14, y * 14, 4, s)); }, finish);
 }
 
-RoomModel Workshop::finish(Executor& executor) && {
-  RoomModel model;
+SceneModel Workshop::finish(Executor& executor) && {
+  SceneModel model;
   for (const Job& job : jobs_) {
     model.textures.push_back(Texture::paint(job.width, job.height, job.texels_per_metre, job.shader, executor));
   }

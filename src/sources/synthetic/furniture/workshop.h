@@ -4,9 +4,10 @@
 
 #include <vector>
 
+#include "base/executor.h"
 #include "sources/synthetic/geometry/shapes.h"
 #include "sources/synthetic/lighting/light.h"
-#include "sources/synthetic/room.h"
+#include "sources/synthetic/scene_view.h"
 #include "sources/synthetic/textures/shaders.h"
 
 namespace photoslam::synthetic {
@@ -20,7 +21,7 @@ struct Finish {
 };
 
 /// Everything the renderer needs to know about the room.
-struct RoomModel {
+struct SceneModel {
   Mesh mesh;
   std::vector<Texture> textures;
   Lights lights;
@@ -31,7 +32,7 @@ struct RoomModel {
 /// Where furniture is made: shapes, materials and chance. Textures are painted at the end, all together.
 class Workshop {
  public:
-  Workshop(uint64_t seed, RoomQuality quality);
+  Workshop(uint64_t seed, SceneQuality quality);
 
   /// A material with a texture of its own. Returns its index.
   int material(float width, float height, float texels_per_metre, Shader shader, const Finish& finish = {});
@@ -47,7 +48,7 @@ class Workshop {
 
   Lights lights;
 
-  RoomModel finish(Executor& executor) &&;
+  SceneModel finish(Executor& executor) &&;
 
  private:
   struct Job {

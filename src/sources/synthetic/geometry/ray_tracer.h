@@ -25,6 +25,15 @@ class RayTracer {
 
     void set(int i, const Vec3f& direction, float far_end = std::numeric_limits<float>::infinity());
     void skip(int i) { set(i, Vec3f::UnitZ(), -1.0f); }
+    /// A zero direction is no ray.
+    void set_or_skip(int i, const Eigen::Vector3d& direction) {
+      if (direction.isZero(0)) {
+        skip(i);
+      } else {
+        set(i, direction.cast<float>());
+      }
+    }
+    bool exists(int i) const { return far[static_cast<size_t>(i)] >= 0; }
     Vec3f direction(int i) const;
   };
 

@@ -79,7 +79,11 @@ Color Gatherer::indirect(const Mesh::Surface& surface, uint32_t seed, Sampling s
     }
     tracer_.intersect(rays, hits);
     for (int i = 0; i < RayTracer::kRays; ++i) {
-      if (hits.triangle[static_cast<size_t>(i)] >= 0) sum += radiance(hits, i, rays.direction(i));
+      if (hits.triangle[static_cast<size_t>(i)] >= 0) {
+        sum += radiance(hits, i, rays.direction(i));
+      } else if (lights_.sky) {
+        sum += lights_.sky(rays.direction(i).normalized());
+      }
     }
   }
   return sum / static_cast<float>(points.size());

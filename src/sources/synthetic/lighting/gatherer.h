@@ -24,7 +24,8 @@ class Gatherer {
   /// Radiance of what ray i has hit.
   using Radiance = std::function<Color(const RayTracer::Hits& hits, int i, const Vec3f& direction)>;
   enum class Sampling { fine, coarse };  ///< 64 or 16 rays.
-  /// Mean radiance from the hemisphere with cosine weights, that is irradiance / π; what is not hit is black.
+  /// Mean radiance from the hemisphere with cosine weights, that is irradiance / π; from where nothing is hit
+  /// comes the light of the sky.
   Color indirect(const Mesh::Surface& surface, uint32_t seed, Sampling sampling, const Radiance& radiance) const;
 
  private:

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "sources/synthetic/geometry/mesh.h"
@@ -34,6 +35,7 @@ struct SunLight {
 struct Lights {
   std::vector<AreaLight> areas;  ///< The first one is the one mirrored in glossy surfaces.
   SunLight sun;
+  std::function<Color(const Vec3f& direction)> sky;  ///< Radiance from where nothing is; empty indoors. Unit vectors.
 };
 
 /// Two axes orthogonal to a unit vector and to each other. Source: Duff et al., "Building an orthonormal basis,
