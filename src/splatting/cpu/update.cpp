@@ -51,7 +51,7 @@ void gather_records(const Frame& frame, size_t rank, float (*rows)[kBlockSize]) 
     const size_t lane = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
     const InstanceRange range = frame.instances[rank * kBlockSize + lane];
     alignas(64) float sums[kRecordSize];
-    const float* record = &frame.gradients[range.first].t;
+    const float* record = &frame.gradients[frame.first_instance(rank * kBlockSize + lane)].t;
     __builtin_prefetch(record + kRecordSize * 16);
     for (size_t i = 0; i < kRecordSize; i += kLanes) {
       Vec sum = hn::Load(kFloats, record + i);
