@@ -134,6 +134,15 @@ HtmlReport evaluate_run(const RunOutcome& run, const SystemOptions& options, Fra
   HtmlReport html;
   html.title = source.info().name;
   html.notes = source.info().notes;
+  const auto connected = connected_frames(run).size();
+  const auto tracked =
+      static_cast<size_t>(std::ranges::count_if(run.frames, [](const FrameOutcome& f) { return f.has_pose; }));
+  if (connected < tracked) {
+    html.notes.push_back(
+        fmt::format("{} of {} tracked frames are in maps that could not be connected with the largest "
+                    "one; the trajectory leaves them out",
+                    tracked - connected, tracked));
+  }
   html.frames = frame_log(run);
   summarize(html.frames, html.report);
   add_mapping_figures(run, html.report);

@@ -50,7 +50,7 @@ struct Features {
 };
 
 struct OrbOptions {
-  int num_features = 1000;
+  int num_features = 1250;
   int num_levels = 8;
   double scale_factor = 1.2;
   int fast_threshold = 20;  ///< Grey levels; cells without a corner retry with min_fast_threshold.

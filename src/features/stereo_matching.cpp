@@ -111,6 +111,9 @@ void StereoOptions::visit(OptionVisitor& v) {
   v.value({"min_depth_baselines", "", 0.5, 100.0,
            "Nearest depth that is matched, in distances between the cameras; smaller takes longer."},
           min_depth_baselines);
+  v.value({"max_depth_baselines", "", 1.0, 10000.0,
+           "Depth beyond this, in distances between the cameras, guides tracking but is not adjusted to."},
+          max_depth_baselines);
   v.value({"max_ambiguity", "", 0.1, 1.0, "Best patch difference over second best; lower drops repetitive patterns."},
           max_ambiguity);
   v.value({"min_correlation", "", 0.0, 1.0, "Normalised cross-correlation of matching patches."}, min_correlation);

@@ -12,9 +12,10 @@
 namespace photoslam {
 
 struct StereoOptions {
-  double min_depth_baselines = 2.0;  ///< Nearest point that is matched, in distances between the cameras.
-  double max_ambiguity = 0.9;        ///< Best patch difference, relative to the second best.
-  double min_correlation = 0.85;     ///< Normalised cross-correlation of the two patches.
+  double min_depth_baselines = 2.0;   ///< Nearest point that is matched, in distances between the cameras.
+  double max_depth_baselines = 40.0;  ///< Depth beyond this is no measurement, only a hint.
+  double max_ambiguity = 0.9;         ///< Best patch difference, relative to the second best.
+  double min_correlation = 0.85;      ///< Normalised cross-correlation of the two patches.
   void visit(OptionVisitor& visitor);
 };
 

@@ -3,8 +3,13 @@
 #include "geometry_mapping/geometry_mapper.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <numbers>
 #include <set>
+
+#include "geometry/triangulation.h"
+#include "geometry_mapping/epipolar_matching.h"
 
 namespace photoslam {
 namespace {
@@ -12,12 +17,19 @@ namespace {
 constexpr int kMinCovisible = 15;
 constexpr int kTrialKeyframes = 3;  // a young landmark must prove itself over this many keyframes
 
+/// 95 % of χ² with two or, with depth, three degrees of freedom.
+double max_chi2(const PixelObservation& observation) { return observation.has_depth() ? 7.815 : 5.991; }
+
 }  // namespace
 
 void GeometryMapperOptions::visit(OptionVisitor& v) {
   v.value({"local_keyframes", "", 2, 200, "Keyframes refined by local bundle adjustment, Eq. (2)."}, local_keyframes);
   v.value({"fixed_keyframes", "", 1, 500, "Further observers of the same landmarks held fixed."}, fixed_keyframes);
   v.value({"fusion_keyframes", "", 0, 100, "Covisible keyframes searched for duplicate landmarks."}, fusion_keyframes);
+  v.value({"triangulation_keyframes", "", 0, 100, "Covisible keyframes with which new landmarks are triangulated."},
+          triangulation_keyframes);
+  v.value({"min_parallax_deg", "deg", 0.05, 45.0, "Angle between the rays of a triangulated landmark."},
+          min_parallax_deg);
   v.value({"fusion_radius_px", "px", 0.5, 50.0, "Search radius for duplicates."}, fusion_radius_px);
   v.value(
       {"min_found_ratio", "", 0.0, 1.0, "Young landmarks matched in fewer of the frames that see them are removed."},
@@ -41,7 +53,7 @@ GeometryUpdate GeometryMapper::process(const KeyframeProposal& proposal, const s
   update.keyframe = proposal.id;
   insert(proposal);
   update.culled_landmarks = cull_recent_landmarks(proposal.id);
-  update.new_landmarks = create_landmarks(proposal.id);
+  update.new_landmarks = create_measured_landmarks(proposal.id) + triangulate_landmarks(proposal.id);
   update.fused_landmarks = fuse_with_neighbours(proposal.id);
   update.moved_keyframes.push_back(proposal.id);
   update.bundle = adjust_locally(proposal.id, interrupted, update.moved_keyframes);
@@ -58,7 +70,20 @@ std::shared_ptr<const MapSnapshot> GeometryMapper::correct(const MapCorrection& 
   return map_.snapshot();
 }
 
+/// The landmark, or the one that replaced it; invalid when it is dead.
+LandmarkId GeometryMapper::living(LandmarkId id) const {
+  while (id.valid() && !map_.landmark(id).view.alive) id = map_.landmark(id).view.replaced_by;
+  return id;
+}
+
 void GeometryMapper::insert(const KeyframeProposal& proposal) {
+  if (const auto& initial = proposal.initial) {
+    map_.add_keyframe(initial->id, initial->frame, initial->camera_from_world);
+    const SE3 world_from_camera = initial->camera_from_world.inverse();
+    for (const auto& [keypoint, in_camera] : initial->points) {
+      recent_landmarks_.push_back(map_.add_landmark(world_from_camera * in_camera, initial->id, keypoint));
+    }
+  }
   // The pose was estimated in an older map: it follows its reference keyframe into this one.
   const SE3 camera_from_world =
       proposal.reference.valid() ? proposal.camera_from_reference * map_.keyframe(proposal.reference).camera_from_world
@@ -67,10 +92,20 @@ void GeometryMapper::insert(const KeyframeProposal& proposal) {
   map_.set_parent(proposal.id, proposal.reference);
   for (const auto& [id, sighting] : proposal.sightings) map_.count_sightings(id, sighting.visible, sighting.found);
   for (size_t i = 0; i < proposal.landmarks.size(); ++i) {
-    LandmarkId id = proposal.landmarks[i];
-    while (id.valid() && !map_.landmark(id).view.alive) id = map_.landmark(id).view.replaced_by;
+    const LandmarkId id = living(proposal.landmarks[i]);
     if (id.valid() && map_.add_observation(id, proposal.id, static_cast<int>(i))) map_.update_view(id);
   }
+  for (const auto& [keypoint, seen] : proposal.same_as) {
+    const LandmarkId id = map_.keyframe(seen.keyframe).landmarks[static_cast<size_t>(seen.keypoint)];
+    if (id.valid() && map_.add_observation(id, proposal.id, keypoint)) map_.update_view(id);
+  }
+}
+
+/// Whether a keyframe measured the depth of the landmark: one such view is worth two.
+bool GeometryMapper::is_measured(const Landmark& landmark) const {
+  return std::ranges::any_of(landmark.observations, [&](const LandmarkObservation& o) {
+    return map_.keyframe(o.keyframe).frame->observations[static_cast<size_t>(o.keypoint)].has_depth();
+  });
 }
 
 int GeometryMapper::cull_recent_landmarks(KeyframeId current) {
@@ -80,7 +115,8 @@ int GeometryMapper::cull_recent_landmarks(KeyframeId current) {
     if (!landmark.view.alive) return true;
     const int age = current.value - landmark.created_by.value;
     const bool rarely_found = landmark.times_found < options_.min_found_ratio * landmark.times_visible;
-    const bool never_seen_again = age >= kTrialKeyframes && landmark.observations.size() < 2;
+    const bool never_seen_again =
+        age >= kTrialKeyframes && static_cast<int>(landmark.observations.size()) < (is_measured(landmark) ? 2 : 3);
     if (rarely_found || never_seen_again) {
       map_.erase_landmark(id);
       ++culled;
@@ -91,16 +127,82 @@ int GeometryMapper::cull_recent_landmarks(KeyframeId current) {
   return culled;
 }
 
-int GeometryMapper::create_landmarks(KeyframeId id) {
+int GeometryMapper::create_measured_landmarks(KeyframeId id) {
   const Keyframe& keyframe = map_.keyframe(id);
-  const SE3 world_from_camera = keyframe.camera_from_world.inverse();
   const double max_depth = options_.max_landmark_depth_baselines * bf_ / camera_.fx;
   int created = 0;
   for (size_t i = 0; i < keyframe.frame->size(); ++i) {
     const auto depth = static_cast<double>(keyframe.frame->depth[i]);
     if (keyframe.landmarks[i].valid() || !(depth > 0) || depth > max_depth) continue;
-    const Vec3 point = world_from_camera * camera_.unproject(keyframe.frame->observations[i].pixel, depth);
-    recent_landmarks_.push_back(map_.add_landmark(point, id, static_cast<int>(i)));
+    const int keypoint = static_cast<int>(i);
+    recent_landmarks_.push_back(map_.add_landmark(*measured_point(keyframe, keypoint), id, keypoint));
+    ++created;
+  }
+  return created;
+}
+
+int GeometryMapper::triangulate_landmarks(KeyframeId id) {
+  auto neighbours = map_.covisible_keyframes(id, kMinCovisible);
+  neighbours.resize(std::min(neighbours.size(), static_cast<size_t>(options_.triangulation_keyframes)));
+  int created = 0;
+  for (const auto& neighbour : neighbours) created += triangulate_with(id, neighbour.keyframe);
+  return created;
+}
+
+/// Whether the point reprojects where the keypoint is, its measured depth included.
+bool GeometryMapper::fits(const Vec3& point, const Keyframe& keyframe, int keypoint) const {
+  const PixelObservation& observation = keyframe.frame->observations[static_cast<size_t>(keypoint)];
+  return reprojection_chi2(camera_, bf_, keyframe.camera_from_world, point, observation) <= max_chi2(observation);
+}
+
+/// Whether the pyramid levels of two keypoints differ as the distances of the point from both cameras do.
+bool GeometryMapper::scales_agree(const Vec3& point, const Keyframe& a, int keypoint_a, const Keyframe& b,
+                                  int keypoint_b) const {
+  const auto size = [&](const Keyframe& k, int keypoint) {
+    const PixelObservation& o = k.frame->observations[static_cast<size_t>(keypoint)];
+    return (k.camera_from_world * point).norm() / std::sqrt(o.inverse_variance);
+  };
+  constexpr double kMaxRatio = 1.8;
+  const double ratio = size(a, keypoint_a) / size(b, keypoint_b);
+  return ratio < kMaxRatio && ratio > 1 / kMaxRatio;
+}
+
+/// Where the depth sensor puts what a keypoint sees; nothing where it measured nothing.
+std::optional<Vec3> GeometryMapper::measured_point(const Keyframe& keyframe, int keypoint) const {
+  const auto i = static_cast<size_t>(keypoint);
+  const auto depth = static_cast<double>(keyframe.frame->depth[i]);
+  if (!(depth > 0)) return std::nullopt;
+  return keyframe.camera_from_world.inverse() * camera_.unproject(keyframe.frame->observations[i].pixel, depth);
+}
+
+/// Landmarks from keypoints of two keyframes that have none, where the rays of both meet at a sufficient angle.
+int GeometryMapper::triangulate_with(KeyframeId id, KeyframeId other_id) {
+  const Keyframe &keyframe = map_.keyframe(id), &other = map_.keyframe(other_id);
+  const auto without_landmark = [](const Keyframe& k) {
+    std::vector<uint8_t> result(k.landmarks.size());
+    for (size_t i = 0; i < result.size(); ++i) result[i] = !k.landmarks[i].valid();
+    return result;
+  };
+  const SE3 other_from_this = other.camera_from_world * keyframe.camera_from_world.inverse();
+  const auto own = without_landmark(keyframe), others = without_landmark(other);
+  const auto pairs =
+      match_along_epipolar_lines(camera_, {*keyframe.frame, own}, {*other.frame, others}, other_from_this);
+  const TriangulationLimits limits{.min_parallax = options_.min_parallax_deg * std::numbers::pi / 180};
+  int created = 0;
+  for (const auto& [i, j] : pairs) {
+    const auto view = [](const Keyframe& k, int keypoint) {
+      const PixelObservation& o = k.frame->observations[static_cast<size_t>(keypoint)];
+      return PointView{k.camera_from_world, o.pixel, 1 / std::sqrt(o.inverse_variance)};
+    };
+    auto point = triangulate(camera_, view(keyframe, i), view(other, j), limits);
+    // Too far for both cameras of the rig and for this motion to fix its depth: still good for the rotation.
+    if (!point) point = measured_point(keyframe, i);
+    if (!point || !fits(*point, keyframe, i) || !fits(*point, other, j)) continue;
+    if (!scales_agree(*point, keyframe, i, other, j)) continue;
+    const LandmarkId landmark = map_.add_landmark(*point, id, i);
+    map_.add_observation(landmark, other_id, j);
+    map_.update_view(landmark);
+    recent_landmarks_.push_back(landmark);
     ++created;
   }
   return created;
@@ -138,11 +240,11 @@ int GeometryMapper::fuse_into(KeyframeId target_id, std::span<const LandmarkId> 
   int fused = 0;
   for (size_t query = 0; query < keypoint_of_query.size(); ++query) {
     if (keypoint_of_query[query] == kNoMatch) continue;
-    const LandmarkId id = projector_.landmark(query).id;
+    const LandmarkId id = projector_.point(query).landmark;
     const auto keypoint = static_cast<size_t>(keypoint_of_query[query]);
-    const bool fits = reprojection_chi2(camera_, bf_, target.camera_from_world, map_.landmark(id).view.position,
-                                        target.frame->observations[keypoint]) < 7.815;
-    if (!fits || !map_.landmark(id).view.alive) continue;
+    if (!map_.landmark(id).view.alive || !fits(map_.landmark(id).view.position, target, keypoint_of_query[query])) {
+      continue;
+    }
     const LandmarkId present = target.landmarks[keypoint];
     if (!present.valid()) {
       if (map_.add_observation(id, target_id, static_cast<int>(keypoint))) map_.update_view(id);
@@ -187,7 +289,7 @@ void GeometryMapper::build_local_problem(KeyframeId id) {
     pose_index[keyframe] = index;
     problem_.camera_from_world.push_back(map_.keyframe(keyframe).camera_from_world);
     // The first keyframe defines the world.
-    const bool fixed = static_cast<size_t>(index) >= num_free || keyframe.value == 0;
+    const bool fixed = static_cast<size_t>(index) >= num_free || !map_.keyframe(keyframe).parent.valid();
     problem_.pose_is_fixed.push_back(fixed ? 1 : 0);
   }
   if (std::ranges::count(problem_.pose_is_fixed, 1) == 0) {  // no outer ring: the oldest keyframe holds the window
@@ -227,10 +329,9 @@ BundleSummary GeometryMapper::adjust_locally(KeyframeId id, const std::function<
 
 void GeometryMapper::remove_outliers() {
   for (const auto& [pose, point, observation] : problem_.observations) {
-    const double limit = observation.has_depth() ? 7.815 : 5.991;
     const double chi2 = reprojection_chi2(camera_, bf_, problem_.camera_from_world[static_cast<size_t>(pose)],
                                           problem_.points_in_world[static_cast<size_t>(point)], observation);
-    if (chi2 > limit) {
+    if (chi2 > max_chi2(observation)) {
       map_.remove_observation(problem_landmarks_[static_cast<size_t>(point)],
                               problem_keyframes_[static_cast<size_t>(pose)]);
     }

@@ -19,6 +19,8 @@ struct GeometryMapperOptions {
   int local_keyframes = 12;
   int fixed_keyframes = 12;
   int fusion_keyframes = 8;
+  int triangulation_keyframes = 10;
+  double min_parallax_deg = 1.0;
   double fusion_radius_px = 3.0;
   double min_found_ratio = 0.25;
   double max_landmark_depth_baselines = 30.0;
@@ -56,7 +58,14 @@ class GeometryMapper {
  private:
   void insert(const KeyframeProposal& proposal);
   int cull_recent_landmarks(KeyframeId current);
-  int create_landmarks(KeyframeId id);
+  LandmarkId living(LandmarkId id) const;
+  int create_measured_landmarks(KeyframeId id);
+  int triangulate_landmarks(KeyframeId id);
+  int triangulate_with(KeyframeId id, KeyframeId other);
+  std::optional<Vec3> measured_point(const Keyframe& keyframe, int keypoint) const;
+  bool fits(const Vec3& point, const Keyframe& keyframe, int keypoint) const;
+  bool scales_agree(const Vec3& point, const Keyframe& a, int keypoint_a, const Keyframe& b, int keypoint_b) const;
+  bool is_measured(const Landmark& landmark) const;
   int fuse_with_neighbours(KeyframeId id);
   int fuse_into(KeyframeId target, std::span<const LandmarkId> landmarks);
   BundleSummary adjust_locally(KeyframeId id, const std::function<bool()>& interrupted, std::vector<KeyframeId>& moved);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "map/testing/point_world.h"
+#include "math/umeyama.h"
 
 namespace photoslam {
 namespace {
@@ -14,13 +15,15 @@ using testing::PointWorld;
 /// Runs tracking and mapping together over the walk; returns the RMSE of the final frame poses [m].
 class WalkTest : public ::testing::Test {
  protected:
-  void walk(PointWorld& world, int num_frames) {
-    Tracker tracker({}, {}, world.camera, world.bf);
-    mapper.emplace(GeometryMapperOptions{}, OrbOptions{}, world.camera, world.bf);
+  void walk(PointWorld& world, int num_frames, double start_s = 0) {
+    const double bf = world.with_depth ? world.bf : 0;
+    Tracker tracker({}, {}, world.camera, bf);
+    mapper.emplace(GeometryMapperOptions{}, OrbOptions{}, world.camera, bf);
     std::shared_ptr<const MapSnapshot> snapshot;
     for (int frame = 0; frame < num_frames; ++frame) {
-      const SE3 truth = PointWorld::camera_from_world(frame / 30.0);
+      const SE3 truth = PointWorld::camera_from_world(start_s + frame / 30.0);
       const TrackingResult result = tracker.track(world.observe(truth, frame), snapshot, true);
+      if (frames.empty() && result.state == TrackingState::initializing) continue;
       ASSERT_TRUE(result.has_pose) << "frame " << frame << ": " << result.reason;
       frames.push_back({truth, result.reference, result.camera_from_reference});
       if (!result.keyframe) continue;
@@ -37,6 +40,23 @@ class WalkTest : public ::testing::Test {
     }
     return std::sqrt(sum / static_cast<double>(frames.size()));
   }
+
+  /// The same after the best similarity transform: what a single camera can know.
+  double final_rmse_with_scale() const {
+    std::vector<Vec3> estimate, truth;
+    for (const auto& frame : frames) {
+      const SE3 pose = frame.camera_from_reference * mapper->map().keyframe(frame.reference).camera_from_world;
+      estimate.push_back(pose.inverse().translation);
+      truth.push_back(frame.truth.inverse().translation);
+    }
+    const Sim3 truth_from_estimate = align_umeyama(estimate, truth, true);
+    double sum = 0;
+    for (size_t i = 0; i < truth.size(); ++i) sum += (truth_from_estimate * estimate[i] - truth[i]).squaredNorm();
+    return std::sqrt(sum / static_cast<double>(truth.size()));
+  }
+
+  /// When the walk no longer sees a single wall only, which two motions would explain [s].
+  static constexpr double kCornerInView = 1.5;
 
   struct TrackedFrame {
     SE3 truth;
@@ -75,6 +95,35 @@ TEST_F(WalkTest, NoisyFeaturesGiveTheAccuracyThatTheirNumberAllows) {
   const double sigma = world.pixel_noise * std::pow(PointWorld::kScaleFactor, 3);
   const double one_pose = 3.0 * 3.0 * std::sqrt(2.0) * sigma / world.bf / std::sqrt(400.0);
   EXPECT_LT(final_rmse(), std::sqrt(2.0) * one_pose);
+}
+
+TEST_F(WalkTest, ASingleCameraGivesTheSameMapUpToItsScale) {
+  PointWorld world;
+  world.with_depth = false;
+  walk(world, 150, kCornerInView);
+  EXPECT_GT(frames.size(), 140u) << "parallax comes within ten frames";
+  EXPECT_LT(final_rmse_with_scale(), 1e-4);
+  // Landmarks of the parts that the first two views did not see were triangulated later.
+  int late = 0;
+  for (size_t i = 0; i < mapper->map().num_landmarks(); ++i) {
+    const Landmark& landmark = mapper->map().landmark(LandmarkId(static_cast<int32_t>(i)));
+    if (landmark.view.alive && landmark.created_by > KeyframeId(1)) ++late;
+  }
+  EXPECT_GT(late, 200);
+}
+
+TEST_F(WalkTest, ASingleCameraToleratesNoise) {
+  PointWorld world;
+  world.with_depth = false;
+  world.pixel_noise = 0.5;
+  walk(world, 150, kCornerInView);
+  EXPECT_GT(frames.size(), 130u);
+  double path = 0;
+  for (size_t i = 1; i < frames.size(); ++i) {
+    path += (frames[i].truth.inverse().translation - frames[i - 1].truth.inverse().translation).norm();
+  }
+  // Nothing but the chain of landmarks keeps the scale while the camera turns from wall to wall.
+  EXPECT_LT(final_rmse_with_scale(), 0.01 * path);
 }
 
 TEST_F(WalkTest, LandmarksAreNotDuplicated) {

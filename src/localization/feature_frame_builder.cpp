@@ -50,11 +50,15 @@ void FeatureFrameBuilder::add_measured_depth(const ImageU16& depth, FeatureFrame
 
 void FeatureFrameBuilder::add_stereo_depth(const ImageU8& right, FeatureFrame& frame) {
   right_pyramid_.build(right, orb_options_.num_levels, orb_options_.scale_factor);
-  const double max_disparity = bf_ / (stereo_matcher_.options().min_depth_baselines * sensor_.baseline_m);
+  const StereoOptions& stereo = stereo_matcher_.options();
+  const auto max_depth = static_cast<float>(stereo.max_depth_baselines * sensor_.baseline_m);
+  const double max_disparity = bf_ / (stereo.min_depth_baselines * sensor_.baseline_m);
   stereo_matcher_.match(extractor_.pyramid(), frame.features.keypoints, right_pyramid_, max_disparity, disparity_);
   for (size_t i = 0; i < frame.size(); ++i) {
     if (std::isnan(disparity_[i])) continue;
     frame.depth[i] = static_cast<float>(bf_) / disparity_[i];
+    // Far away the smallest error of the calibration outweighs what the disparity says; the depth still helps tracking.
+    if (frame.depth[i] > max_depth) continue;
     frame.observations[i].u_right = static_cast<double>(frame.features.keypoints[i].x - disparity_[i]);
   }
 }

@@ -23,7 +23,7 @@ LandmarkProjector::LandmarkProjector(const OrbOptions& orb, const PinholeCamera&
 
 void LandmarkProjector::clear() {
   queries_.clear();
-  landmarks_.clear();
+  points_.clear();
 }
 
 bool LandmarkProjector::project(const SE3& camera_from_world, const Vec3& position, ProjectionQuery& query) const {
@@ -52,20 +52,21 @@ void LandmarkProjector::add(const SE3& camera_from_world, LandmarkId id, const L
   query.radius = radius_px * level_scale_[static_cast<size_t>(predicted)];
   query.descriptor = view.descriptor;
   queries_.push_back(query);
-  landmarks_.push_back({id, view.position});
+  points_.push_back({id, {}, view.position});
 }
 
-void LandmarkProjector::add(const SE3& camera_from_world, LandmarkId id, const Vec3& position, const Keypoint& keypoint,
-                            const Descriptor& descriptor, float radius_px) {
+void LandmarkProjector::add(const SE3& camera_from_world, const TrackedPoint& point, const Features& seen, size_t index,
+                            float radius_px) {
   ProjectionQuery query;
-  if (!project(camera_from_world, position, query)) return;
+  if (!project(camera_from_world, point.position, query)) return;
+  const Keypoint& keypoint = seen.keypoints[index];
   query.min_octave = std::max(keypoint.octave - 1, 0);
   query.max_octave = std::min(keypoint.octave + 1, num_levels_ - 1);
   query.radius = radius_px * level_scale_[static_cast<size_t>(keypoint.octave)];
   query.angle = keypoint.angle;
-  query.descriptor = descriptor;
+  query.descriptor = seen.descriptors[index];
   queries_.push_back(query);
-  landmarks_.push_back({id, position});
+  points_.push_back(point);
 }
 
 }  // namespace photoslam

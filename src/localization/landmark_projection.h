@@ -11,10 +11,11 @@
 
 namespace photoslam {
 
-/// A landmark that should be visible, and where to look for it.
-struct ProjectedLandmark {
-  LandmarkId id;
-  Vec3 position = Vec3::Zero();
+/// A point that should be visible: a landmark, what a keypoint of a pending keyframe sees, or neither.
+struct TrackedPoint {
+  LandmarkId landmark;
+  LandmarkObservation same_as;
+  Vec3 position = Vec3::Zero();  ///< In the world.
 };
 
 /// Projects landmarks into a camera and says where and on which pyramid level to look for them.
@@ -26,13 +27,13 @@ class LandmarkProjector {
   /// (more than 60° off its mean viewing direction). The radius [px] is multiplied by the scale of the predicted level.
   void add(const SE3& camera_from_world, LandmarkId id, const LandmarkView& view, float radius_px);
 
-  /// Appends a bare point last seen at `keypoint`: the search covers its octave and both neighbours.
-  void add(const SE3& camera_from_world, LandmarkId id, const Vec3& position, const Keypoint& keypoint,
-           const Descriptor& descriptor, float radius_px);
+  /// Appends a point last seen at keypoint `index` of `seen`: the search covers its octave and both neighbours.
+  void add(const SE3& camera_from_world, const TrackedPoint& point, const Features& seen, size_t index,
+           float radius_px);
 
   void clear();
   std::span<const ProjectionQuery> queries() const { return queries_; }
-  const ProjectedLandmark& landmark(size_t query) const { return landmarks_[query]; }
+  const TrackedPoint& point(size_t query) const { return points_[query]; }
   size_t size() const { return queries_.size(); }
 
  private:
@@ -44,7 +45,7 @@ class LandmarkProjector {
   PinholeCamera camera_;
   double bf_;
   std::vector<ProjectionQuery> queries_;
-  std::vector<ProjectedLandmark> landmarks_;
+  std::vector<TrackedPoint> points_;
 };
 
 }  // namespace photoslam

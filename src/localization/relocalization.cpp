@@ -4,37 +4,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
-
-#include "features/matching.h"
 
 namespace photoslam {
 namespace {
 
-std::optional<SE3> pose_against_keyframe(const RelocalizationOptions& options, const PinholeCamera& camera,
-                                         const MapSnapshot& map, const FeatureFrame& frame, const Keyframe& keyframe) {
-  MatchOptions match_options;
-  match_options.max_distance = 64;
-  match_options.max_ratio = 0.8;
-  std::vector<int> keypoint_in_frame;
-  match_brute_force(match_options, keyframe.frame->features, frame.features, keypoint_in_frame);
-
-  std::vector<Vec3> points;
-  std::vector<Vec2> pixels;
-  std::vector<double> sigmas;
-  for (size_t i = 0; i < keypoint_in_frame.size(); ++i) {
-    LandmarkId id = keyframe.landmarks[i];
-    const LandmarkView* view = map.find(id);
-    if (keypoint_in_frame[i] == kNoMatch || view == nullptr) continue;
-    const PixelObservation& observation = frame.observations[static_cast<size_t>(keypoint_in_frame[i])];
-    points.push_back(view->position);
-    pixels.push_back(observation.pixel);
-    sigmas.push_back(1.0 / std::sqrt(observation.inverse_variance));
-  }
-  if (static_cast<int>(points.size()) < options.min_matches) return std::nullopt;
-  const PoseRansacResult result = estimate_pose_ransac(options.pose_ransac, camera, points, pixels, sigmas);
-  if (!result.success) return std::nullopt;
-  return result.camera_from_world;
+/// The descriptors of the strongest corners; more of them find hardly more places, and cost memory and time.
+std::vector<Descriptor> strongest(const Features& features) {
+  constexpr size_t kCount = 300;
+  std::vector<size_t> order(features.size());
+  for (size_t i = 0; i < order.size(); ++i) order[i] = i;
+  const size_t count = std::min(kCount, order.size());
+  std::ranges::partial_sort(order, order.begin() + static_cast<std::ptrdiff_t>(count), [&](size_t a, size_t b) {
+    const float ra = features.keypoints[a].response, rb = features.keypoints[b].response;
+    return ra != rb ? ra > rb : a < b;
+  });
+  std::vector<Descriptor> descriptors;
+  for (size_t i = 0; i < count; ++i) descriptors.push_back(features.descriptors[order[i]]);
+  return descriptors;
 }
 
 }  // namespace
@@ -43,19 +29,81 @@ void RelocalizationOptions::visit(OptionVisitor& v) {
   v.value({"max_candidates", "", 1, 1000, "Keyframes tried per lost frame; more find the place sooner and cost time."},
           max_candidates);
   v.value({"min_matches", "", 6, 1000, "Descriptor matches a candidate needs."}, min_matches);
+  v.value({"min_inliers", "", 6, 1000, "Landmarks that must fit the pose found; lower finds more, also wrong ones."},
+          min_inliers);
+  v.value({"search_radius_px", "px", 1.0, 100.0, "Search radius for further landmarks around the pose found."},
+          search_radius_px);
   v.group("pose_ransac", "Robust pose from matches.", pose_ransac);
 }
 
-std::optional<SE3> relocalize(const RelocalizationOptions& options, const PinholeCamera& camera, const MapSnapshot& map,
-                              const FeatureFrame& frame, int attempt) {
-  const int count = static_cast<int>(map.keyframes.size());
-  const int tries = std::min(options.max_candidates, count);
-  for (int i = 0; i < tries; ++i) {
-    const int back = i == 0 ? 0 : (attempt * (tries - 1) + i) % count;
-    const KeyframeView& candidate = map.keyframe(KeyframeId(count - 1 - back));
-    if (auto pose = pose_against_keyframe(options, camera, map, frame, candidate.keyframe)) return pose;
+void Relocalizer::update(const MapSnapshot& map) {
+  for (; num_filed_ < static_cast<int>(map.keyframes.size()); ++num_filed_) {
+    places_.add(num_filed_, strongest(map.keyframe(KeyframeId(num_filed_)).keyframe.frame->features));
+  }
+}
+
+std::optional<Relocalization> Relocalizer::relocalize(const MapSnapshot& map, const FeatureFrame& frame,
+                                                      KeyframeId likely) {
+  std::vector<KeyframeId> candidates;
+  if (map.has(likely)) candidates.push_back(likely);
+  for (const PlaceCandidate& place : places_.query(strongest(frame.features), options_.max_candidates)) {
+    const KeyframeId id(place.place);
+    if (map.has(id) && id != likely) candidates.push_back(id);
+  }
+  for (const KeyframeId candidate : candidates) {
+    if (const auto pose = pose_against(map, frame, candidate)) return Relocalization{*pose, candidate};
   }
   return std::nullopt;
+}
+
+std::optional<SE3> Relocalizer::pose_against(const MapSnapshot& map, const FeatureFrame& frame, KeyframeId candidate) {
+  const Keyframe& keyframe = map.keyframe(candidate).keyframe;
+  MatchOptions match_options;
+  match_options.max_distance = 64;
+  match_options.max_ratio = 0.8;
+  std::vector<int> keypoint_in_frame;
+  match_brute_force(match_options, keyframe.frame->features, frame.features, keypoint_in_frame);
+
+  FrameMatches matches(frame.size());
+  int count = 0;
+  for (size_t i = 0; i < keypoint_in_frame.size(); ++i) {
+    LandmarkId id = keyframe.landmarks[i];
+    const LandmarkView* view = map.find(id);
+    if (keypoint_in_frame[i] == kNoMatch || view == nullptr) continue;
+    const auto keypoint = static_cast<size_t>(keypoint_in_frame[i]);
+    matches.point[keypoint] = {id, {}, view->position};
+    matches.matched[keypoint] = 1;
+    ++count;
+  }
+  if (count < options_.min_matches) return std::nullopt;
+  const auto pose = alignment_.estimate(options_.pose_ransac, frame, matches);
+  if (!pose) return std::nullopt;
+  return verified(map, frame, candidate, *pose);
+}
+
+/// Chance agrees with a dozen descriptors; it does not put the landmarks all around where the frame has them.
+std::optional<SE3> Relocalizer::verified(const MapSnapshot& map, const FeatureFrame& frame, KeyframeId candidate,
+                                         SE3 pose) {
+  constexpr size_t kNeighbours = 10;
+  std::vector<KeyframeId> keyframes{candidate};
+  for (const CovisibleKeyframe& neighbour : map.keyframe(candidate).covisible) {
+    if (keyframes.size() > kNeighbours) break;
+    keyframes.push_back(neighbour.keyframe);
+  }
+  MatchOptions match_options;
+  match_options.max_distance = 64;
+  match_options.max_ratio = 0.85;
+  match_options.check_rotation = false;
+  int inliers = 0;
+  for (const double radius : {options_.search_radius_px, options_.search_radius_px / 2}) {
+    FrameMatches matches(frame.size());
+    alignment_.project_landmarks(pose, map, keyframes, static_cast<float>(radius), matches);
+    alignment_.match(frame, match_options, matches);
+    inliers = alignment_.refine(frame, matches, pose);
+    if (inliers < options_.min_inliers / 2) return std::nullopt;
+  }
+  if (inliers < options_.min_inliers) return std::nullopt;
+  return pose;
 }
 
 }  // namespace photoslam

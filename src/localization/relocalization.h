@@ -5,22 +5,48 @@
 #include <optional>
 
 #include "base/options.h"
+#include "features/place_index.h"
 #include "geometry/absolute_pose.h"
-#include "map/snapshot.h"
+#include "localization/frame_alignment.h"
 
 namespace photoslam {
 
 struct RelocalizationOptions {
-  int max_candidates = 5;  ///< Keyframes tried per frame.
-  int min_matches = 20;
+  int max_candidates = 4;  ///< Keyframes tried per frame.
+  int min_matches = 15;
+  int min_inliers = 40;
+  double search_radius_px = 8.0;
   PoseRansacOptions pose_ransac;
   void visit(OptionVisitor& visitor);
 };
 
-/// Finds the pose of a frame in the map without a prior: descriptor matches against candidate keyframes, then robust
-/// perspective-n-point. Candidates rotate through the whole map from call to call (`attempt` counts them), the most
-/// recent keyframe first, so that every place is tried within keyframes / max_candidates frames.
-std::optional<SE3> relocalize(const RelocalizationOptions& options, const PinholeCamera& camera, const MapSnapshot& map,
-                              const FeatureFrame& frame, int attempt);
+/// A pose found without a prior, and the keyframe it was found with.
+struct Relocalization {
+  SE3 camera_from_world;
+  KeyframeId keyframe;
+};
+
+/// Finds the pose of a frame in the map without a prior: keyframes of places that look alike, descriptor matches with
+/// each, robust perspective-n-point, guided search of the landmarks around, refinement. Deterministic.
+class Relocalizer {
+ public:
+  Relocalizer(const RelocalizationOptions& options, FrameAlignment alignment)
+      : options_(options), alignment_(std::move(alignment)) {}
+
+  /// Files the keyframes that are new in the map.
+  void update(const MapSnapshot& map);
+
+  /// `likely` is tried first if it is in the map. update() must have seen the map.
+  std::optional<Relocalization> relocalize(const MapSnapshot& map, const FeatureFrame& frame, KeyframeId likely);
+
+ private:
+  std::optional<SE3> pose_against(const MapSnapshot& map, const FeatureFrame& frame, KeyframeId candidate);
+  std::optional<SE3> verified(const MapSnapshot& map, const FeatureFrame& frame, KeyframeId candidate, SE3 pose);
+
+  RelocalizationOptions options_;
+  FrameAlignment alignment_;
+  PlaceIndex places_;
+  int num_filed_ = 0;
+};
 
 }  // namespace photoslam

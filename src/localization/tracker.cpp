@@ -12,12 +12,24 @@
 namespace photoslam {
 namespace {
 
+/// Distance between the worlds of maps that are not connected: nothing of one is ever seen in another.
+constexpr double kMapSpacing = 1e4;
+
 /// How far apart two views are: 1 at half the median depth of translation, or at 45° between the viewing directions.
 double view_distance(const SE3& a_from_world, const SE3& b_from_world, double median_depth) {
   const SE3 a_from_b = a_from_world * b_from_world.inverse();
   const double cosine = (a_from_b.rotation * Vec3::UnitZ()).z();
   constexpr double kQuarterTurn = 1.0 - 0.7071;
   return a_from_b.translation.norm() / (0.5 * std::max(median_depth, 1e-6)) + (1.0 - cosine) / kQuarterTurn;
+}
+
+/// Of the matched points [m]; 0 when there are none.
+double median_depth(const SE3& camera_from_world, const FrameMatches& matches) {
+  std::vector<double> depths;
+  for (size_t i = 0; i < matches.matched.size(); ++i) {
+    if (matches.matched[i]) depths.push_back((camera_from_world * matches.point[i].position).z());
+  }
+  return depths.empty() ? 0 : lower_median(depths);
 }
 
 }  // namespace
@@ -47,56 +59,113 @@ void TrackerOptions::visit(OptionVisitor& v) {
           local_map_radius_px);
   v.value({"max_local_keyframes", "", 1, 1000, "Keyframes whose landmarks are searched in each frame."},
           max_local_keyframes);
-  v.value({"recently_lost_s", "s", 0.0, 1000.0, "After this long without a pose the state is lost."}, recently_lost_s);
+  v.value({"recently_lost_s", "s", 0.0, 1000.0,
+           "After this long without a pose the state is lost, and a separate map may begin."},
+          recently_lost_s);
+  v.group("initialization", "The first two views of a single camera.", initialization);
   v.group("pose_refinement", "Motion-only bundle adjustment, Eq. (1).", pose_refinement);
   v.group("keyframes", "When a frame becomes a keyframe.", keyframes);
   v.group("relocalization", "Finding the map again after tracking was lost.", relocalization);
 }
 
 Tracker::Tracker(const TrackerOptions& options, const OrbOptions& orb, const PinholeCamera& camera, double bf)
-    : options_(options), camera_(camera), bf_(bf), projector_(orb, camera, bf), keyframe_decision_(options.keyframes) {}
+    : options_(options),
+      camera_(camera),
+      bf_(bf),
+      alignment_(options.pose_refinement, orb, camera, bf),
+      relocalizer_(options.relocalization, alignment_),
+      initializer_(options.initialization, camera),
+      keyframe_decision_(options.keyframes) {}
 
 TrackingResult Tracker::track(std::shared_ptr<const FeatureFrame> frame, std::shared_ptr<const MapSnapshot> map,
                               bool may_become_keyframe) {
   map_ = std::move(map);
-  std::erase_if(pending_, [&](const auto& entry) { return map_ && map_->has(entry.first); });
+  if (map_) {
+    pending_.update(*map_);
+    relocalizer_.update(*map_);
+  }
   if (num_proposed_ == 0) {
-    if (!may_become_keyframe) return lost(*frame, "waiting for the first keyframe");
-    return initialize(frame);
+    return may_become_keyframe ? start_map(frame) : lost(*frame, "waiting for the first keyframe");
   }
 
   SE3 camera_from_world;
-  Matches matches(frame->size());
+  KeyframeId reference = reference_;
   bool found = lost_frames_ == 0 && track_last_frame(*frame, camera_from_world);
   if (!found && map_) {
-    const auto pose = relocalize(options_.relocalization, camera_, *map_, *frame, lost_frames_);
-    found = pose.has_value();
-    if (found) camera_from_world = *pose;
-    has_motion_ = false;
+    const auto relocalization = relocalizer_.relocalize(*map_, *frame, reference_);
+    found = relocalization.has_value();
+    if (found) {
+      camera_from_world = relocalization->camera_from_world;
+      reference = relocalization->keyframe;
+    }
   }
-  if (!found) return lost(*frame, frame->size() < 50 ? "too little texture" : "too few matches");
-
-  const int num_inliers = track_local_map(*frame, camera_from_world, matches);
-  if (num_inliers < options_.min_inliers) return lost(*frame, "too few landmarks of the local map");
-  return tracked(frame, camera_from_world, matches, num_inliers, may_become_keyframe);
+  std::string reason = frame->size() < 50 ? "too little texture" : "too few matches";
+  if (found) {
+    FrameMatches matches(frame->size());
+    const int num_inliers = track_local_map(*frame, camera_from_world, matches);
+    if (num_inliers >= options_.min_inliers) {
+      if (reference != reference_) lost_frames_ = std::max(lost_frames_, 1);  // the last frame tells no velocity
+      reference_ = reference;
+      return tracked(frame, camera_from_world, std::move(matches), num_inliers, may_become_keyframe);
+    }
+    reason = "too few landmarks of the local map";
+  }
+  const double gap_s = 1e-9 * static_cast<double>(frame->timestamp_ns - last_->timestamp_ns);
+  if (gap_s > options_.recently_lost_s && may_become_keyframe) {
+    TrackingResult result = start_map(frame);
+    if (result.has_pose) return result;
+  }
+  return lost(*frame, std::move(reason));
 }
 
-TrackingResult Tracker::initialize(const std::shared_ptr<const FeatureFrame>& frame) {
-  const auto with_depth = std::ranges::count_if(frame->depth, [](float d) { return d > 0; });
-  if (with_depth < options_.min_initial_landmarks) {
-    return lost(*frame, fmt::format("{} keypoints with depth, {} needed", with_depth, options_.min_initial_landmarks));
-  }
+/// Begins a map with this frame. Its world is that of its first keyframe, moved aside from those of earlier maps.
+TrackingResult Tracker::start_map(const std::shared_ptr<const FeatureFrame>& frame) {
   TrackingResult result;
-  result.camera_from_world = SE3{};
-  Matches matches(frame->size());
-  result.keyframe = propose(frame, result, matches);
+  result.num_features = static_cast<int>(frame->size());
+  const SE3 first_from_world(Quat::Identity(), Vec3(-kMapSpacing * num_maps_, 0, 0));
+  FrameMatches matches(frame->size());
+  if (bf_ > 0) {
+    result.num_inliers = static_cast<int>(std::ranges::count_if(frame->depth, [](float d) { return d > 0; }));
+    if (result.num_inliers < options_.min_initial_landmarks) {
+      return lost(*frame, fmt::format("{} keypoints with depth, {} needed", result.num_inliers,
+                                      options_.min_initial_landmarks));
+    }
+    reference_ = KeyframeId{};
+    result.camera_from_world = first_from_world;
+    result.keyframe = propose(frame, result, matches);
+  } else {
+    std::string reason;
+    const auto pair = initializer_.add(frame, reason);
+    if (!pair) return lost(*frame, std::move(reason));
+    InitialKeyframe initial{KeyframeId(num_proposed_++), pair->first, first_from_world, {}};
+    Points points;
+    const SE3 world_from_first = first_from_world.inverse();
+    for (const auto& [first_keypoint, second_keypoint, in_first] : pair->points) {
+      initial.points.emplace_back(first_keypoint, in_first);
+      points.push_back({first_keypoint, in_first});
+      const auto i = static_cast<size_t>(second_keypoint);
+      matches.point[i] = {LandmarkId{}, {initial.id, first_keypoint}, world_from_first * in_first};
+      matches.matched[i] = 1;
+    }
+    pending_.add(initial.id, initial.frame, KeyframeId{}, initial.camera_from_world, std::move(points));
+    reference_ = initial.id;
+    result.num_inliers = static_cast<int>(pair->points.size());
+    result.camera_from_reference = pair->second_from_first;
+    result.camera_from_world = pair->second_from_first * first_from_world;
+    result.keyframe = propose(frame, result, matches);
+    result.keyframe->initial = std::move(initial);
+    initializer_.restart();
+  }
+  ++num_maps_;
   result.state = TrackingState::tracking;
   result.has_pose = true;
   result.reference = reference_;
-  result.num_features = static_cast<int>(frame->size());
-  result.num_inliers = static_cast<int>(with_depth);
+  result.camera_from_reference = SE3{};
   last_ = frame;
-  last_landmarks_ = std::move(matches.landmark);
+  last_matches_ = std::move(matches);
+  last_camera_from_reference_ = SE3{};
+  velocity_.reset();
+  lost_frames_ = 0;
   return result;
 }
 
@@ -106,18 +175,19 @@ TrackingResult Tracker::lost(const FeatureFrame& frame, std::string reason) {
   result.num_features = static_cast<int>(frame.size());
   if (num_proposed_ == 0) return result;
   ++lost_frames_;
-  has_motion_ = false;
+  velocity_.reset();
   const double gap_s = 1e-9 * static_cast<double>(frame.timestamp_ns - last_->timestamp_ns);
   result.state = gap_s <= options_.recently_lost_s ? TrackingState::recently_lost : TrackingState::lost;
   return result;
 }
 
 TrackingResult Tracker::tracked(const std::shared_ptr<const FeatureFrame>& frame, const SE3& camera_from_world,
-                                const Matches& matches, int num_inliers, bool may_become_keyframe) {
-  const SE3 last_camera_from_world = last_camera_from_reference_ * pose_of(reference_);
-  has_motion_ = lost_frames_ == 0;
-  motion_ = camera_from_world * last_camera_from_world.inverse();
+                                FrameMatches matches, int num_inliers, bool may_become_keyframe) {
+  velocity_.reset();
+  const auto elapsed = static_cast<double>(frame->timestamp_ns - last_->timestamp_ns);
+  if (lost_frames_ == 0 && elapsed > 0) velocity_ = (camera_from_world * last_pose().inverse()).log() / elapsed;
   lost_frames_ = 0;
+  initializer_.restart();
 
   TrackingResult result;
   result.state = TrackingState::tracking;
@@ -134,64 +204,60 @@ TrackingResult Tracker::tracked(const std::shared_ptr<const FeatureFrame>& frame
     result.camera_from_reference = SE3{};
   }
   last_ = frame;
-  last_landmarks_ = matches.landmark;
+  last_matches_ = std::move(matches);
   last_camera_from_reference_ = result.camera_from_reference;
   return result;
 }
 
-SE3 Tracker::pose_of(KeyframeId keyframe) const {
-  if (map_ && map_->has(keyframe)) return map_->keyframe(keyframe).keyframe.camera_from_world;
-  const PendingKeyframe& pending = pending_.at(keyframe);
-  if (!pending.reference.valid()) return pending.camera_from_reference;
-  return pending.camera_from_reference * pose_of(pending.reference);
-}
-
-SE3 Tracker::predict_pose() const {
-  const SE3 last_camera_from_world = last_camera_from_reference_ * pose_of(reference_);
-  return has_motion_ ? motion_ * last_camera_from_world : last_camera_from_world;
-}
-
-int Tracker::match(const FeatureFrame& frame, const MatchOptions& options, Matches& matches) {
-  std::vector<float> u_right(frame.size());
-  for (size_t i = 0; i < frame.size(); ++i) u_right[i] = static_cast<float>(frame.observations[i].u_right);
-  std::vector<int> keypoint_of_query;
-  matcher_.match(options, {frame.features, frame.grid, u_right, matches.matched}, projector_.queries(),
-                 keypoint_of_query);
-  int count = 0;
-  for (size_t query = 0; query < keypoint_of_query.size(); ++query) {
-    if (keypoint_of_query[query] == kNoMatch) continue;
-    const auto keypoint = static_cast<size_t>(keypoint_of_query[query]);
-    matches.landmark[keypoint] = projector_.landmark(query).id;
-    matches.position[keypoint] = projector_.landmark(query).position;
-    matches.matched[keypoint] = 1;
-    ++count;
+/// Looks up what the map now knows of the points that the last frame saw.
+void Tracker::resolve_last_matches() {
+  const SE3 world_from_last = last_pose().inverse();
+  for (size_t i = 0; i < last_->size(); ++i) {
+    TrackedPoint& point = last_matches_.point[i];
+    if (last_matches_.matched[i] && map_ && map_->has(point.same_as.keyframe)) {
+      const Keyframe& keyframe = map_->keyframe(point.same_as.keyframe).keyframe;
+      point.landmark = keyframe.landmarks[static_cast<size_t>(point.same_as.keypoint)];
+      point.same_as = {};
+    }
+    if (const LandmarkView* view = map_ ? map_->find(point.landmark) : nullptr) {
+      point.position = view->position;
+    } else if (!last_matches_.matched[i] || !point.same_as.keyframe.valid()) {
+      last_matches_.matched[i] = 0;
+      if (!(last_->depth[i] > 0)) continue;
+      const auto depth = static_cast<double>(last_->depth[i]);
+      point = {{}, {}, world_from_last * camera_.unproject(last_->observations[i].pixel, depth)};
+      last_matches_.matched[i] = 1;
+    }
   }
-  return count;
 }
 
 bool Tracker::track_last_frame(const FeatureFrame& frame, SE3& camera_from_world) {
-  camera_from_world = predict_pose();
-  const SE3 world_from_last = (last_camera_from_reference_ * pose_of(reference_)).inverse();
-  MatchOptions match_options;
-  for (const double widening : {1.0, 3.0}) {
-    projector_.clear();
+  resolve_last_matches();
+  camera_from_world = last_pose();
+  if (velocity_) {
+    const auto elapsed = static_cast<double>(frame.timestamp_ns - last_->timestamp_ns);
+    camera_from_world = SE3::exp(*velocity_ * elapsed) * camera_from_world;
+  }
+  // Without a velocity the points near by may be far from where they were. Those far away would vouch for a camera at
+  // rest: the most numerous consensus decides.
+  constexpr double kWide = 4.0;
+  for (const double widening : {1.0, kWide}) {
+    if (!velocity_ && widening < kWide) continue;
+    alignment_.projector().clear();
     const auto radius = static_cast<float>(options_.last_frame_radius_px * widening);
     for (size_t i = 0; i < last_->size(); ++i) {
-      LandmarkId id = last_landmarks_[i];
-      const Keypoint& keypoint = last_->features.keypoints[i];
-      const Descriptor& descriptor = last_->features.descriptors[i];
-      if (const LandmarkView* view = map_ ? map_->find(id) : nullptr) {
-        projector_.add(camera_from_world, id, view->position, keypoint, descriptor, radius);
-      } else if (last_->depth[i] > 0) {
-        const Vec3 point =
-            world_from_last * camera_.unproject(last_->observations[i].pixel, static_cast<double>(last_->depth[i]));
-        projector_.add(camera_from_world, LandmarkId{}, point, keypoint, descriptor, radius);
-      }
+      if (!last_matches_.matched[i]) continue;
+      alignment_.projector().add(camera_from_world, last_matches_.point[i], last_->features, i, radius);
     }
-    Matches matches(frame.size());
+    FrameMatches matches(frame.size());
     SE3 refined = camera_from_world;
-    if (match(frame, match_options, matches) >= options_.min_inliers &&
-        refine(frame, matches, refined) >= options_.min_inliers / 2) {
+    if (alignment_.match(frame, {}, matches) < options_.min_inliers) continue;
+    if (widening == kWide) {
+      const auto consensus = alignment_.estimate(options_.relocalization.pose_ransac, frame, matches);
+      if (!consensus) continue;
+      refined = *consensus;
+    }
+    if (alignment_.refine(frame, matches, refined) >= options_.min_inliers / 2) {
       camera_from_world = refined;
       return true;
     }
@@ -199,56 +265,31 @@ bool Tracker::track_last_frame(const FeatureFrame& frame, SE3& camera_from_world
   return false;
 }
 
-int Tracker::track_local_map(const FeatureFrame& frame, SE3& camera_from_world, Matches& matches) {
-  project_local_landmarks(camera_from_world);
+int Tracker::track_local_map(const FeatureFrame& frame, SE3& camera_from_world, FrameMatches& matches) {
   MatchOptions match_options;
   match_options.max_ratio = 0.85;
   match_options.check_rotation = false;
-  match(frame, match_options, matches);
-
-  // Until the map knows the first keyframes, the last frame's own depth carries the tracking.
-  if (!map_ || map_->num_landmarks == 0) {
-    projector_.clear();
-    const SE3 world_from_last = (last_camera_from_reference_ * pose_of(reference_)).inverse();
-    for (size_t i = 0; i < last_->size(); ++i) {
-      if (!(last_->depth[i] > 0)) continue;
-      const Vec3 point =
-          world_from_last * camera_.unproject(last_->observations[i].pixel, static_cast<double>(last_->depth[i]));
-      projector_.add(camera_from_world, LandmarkId{}, point, last_->features.keypoints[i],
-                     last_->features.descriptors[i], static_cast<float>(options_.local_map_radius_px));
+  const auto radius = static_cast<float>(options_.local_map_radius_px);
+  if (map_) {
+    alignment_.project_landmarks(camera_from_world, *map_, local_keyframes(camera_from_world), radius, matches);
+    alignment_.match(frame, match_options, matches);
+    for (size_t i = 0; i < alignment_.projector().size(); ++i) {
+      ++sightings_[alignment_.projector().point(i).landmark].visible;
     }
-    match(frame, match_options, matches);
   }
+  // What the newest keyframes measured, until the map has landmarks for it.
+  alignment_.projector().clear();
+  pending_.for_each_point(map_.get(), [&](const LandmarkObservation& seen, const FeatureFrame& by, const Vec3& point) {
+    alignment_.projector().add(camera_from_world, {LandmarkId{}, seen, point}, by.features,
+                               static_cast<size_t>(seen.keypoint), radius);
+  });
+  alignment_.match(frame, match_options, matches);
 
-  for (size_t i = 0; i < projector_.size(); ++i) {
-    if (projector_.landmark(i).id.valid()) ++sightings_[projector_.landmark(i).id].visible;
-  }
-  const int num_inliers = refine(frame, matches, camera_from_world);
-  for (const LandmarkId id : matches.landmark) {
-    if (id.valid()) ++sightings_[id].found;
+  const int num_inliers = alignment_.refine(frame, matches, camera_from_world);
+  for (size_t i = 0; i < frame.size(); ++i) {
+    if (matches.matched[i] && matches.point[i].landmark.valid()) ++sightings_[matches.point[i].landmark].found;
   }
   return num_inliers;
-}
-
-int Tracker::refine(const FeatureFrame& frame, Matches& matches, SE3& camera_from_world) const {
-  std::vector<size_t> keypoints;
-  std::vector<Vec3> points;
-  std::vector<PixelObservation> observations;
-  for (size_t i = 0; i < frame.size(); ++i) {
-    if (!matches.matched[i]) continue;
-    keypoints.push_back(i);
-    points.push_back(matches.position[i]);
-    observations.push_back(frame.observations[i]);
-  }
-  const PoseRefinementResult result =
-      refine_pose(options_.pose_refinement, camera_, bf_, points, observations, camera_from_world);
-  camera_from_world = result.camera_from_world;
-  for (size_t i = 0; i < keypoints.size(); ++i) {
-    if (result.inlier[i]) continue;
-    matches.landmark[keypoints[i]] = LandmarkId{};
-    matches.matched[keypoints[i]] = 0;
-  }
-  return result.converged ? result.num_inliers : 0;
 }
 
 std::vector<KeyframeId> Tracker::local_keyframes(const SE3& camera_from_world) const {
@@ -269,38 +310,30 @@ std::vector<KeyframeId> Tracker::local_keyframes(const SE3& camera_from_world) c
   return ids;
 }
 
-void Tracker::project_local_landmarks(const SE3& camera_from_world) {
-  projector_.clear();
-  if (!map_) return;
-  std::set<LandmarkId> seen;
-  for (const KeyframeId id : local_keyframes(camera_from_world)) {
-    for (LandmarkId landmark : map_->keyframe(id).keyframe.landmarks) {
-      const LandmarkView* view = map_->find(landmark);
-      if (view == nullptr || !seen.insert(landmark).second) continue;
-      projector_.add(camera_from_world, landmark, *view, static_cast<float>(options_.local_map_radius_px));
-    }
-  }
-}
-
-double Tracker::median_depth(const SE3& camera_from_world, const Matches& matches) const {
-  std::vector<double> depths;
-  for (size_t i = 0; i < matches.position.size(); ++i) {
-    if (matches.matched[i]) depths.push_back((camera_from_world * matches.position[i]).z());
-  }
-  return depths.empty() ? 0 : lower_median(depths);
-}
-
 KeyframeProposal Tracker::propose(const std::shared_ptr<const FeatureFrame>& frame, const TrackingResult& result,
-                                  const Matches& matches) {
+                                  const FrameMatches& matches) {
   KeyframeProposal proposal;
   proposal.id = KeyframeId(num_proposed_++);
   proposal.frame = frame;
   proposal.reference = reference_;
   proposal.camera_from_reference = reference_.valid() ? result.camera_from_reference : result.camera_from_world;
-  proposal.landmarks = matches.landmark;
+  proposal.landmarks.resize(frame->size());
   proposal.sightings = std::move(sightings_);
   sightings_.clear();
-  pending_[proposal.id] = {proposal.reference, proposal.camera_from_reference};
+  Points points;
+  for (size_t i = 0; i < frame->size(); ++i) {
+    const int keypoint = static_cast<int>(i);
+    const TrackedPoint& point = matches.point[i];
+    if (matches.matched[i] && point.landmark.valid()) {
+      proposal.landmarks[i] = point.landmark;
+    } else if (matches.matched[i] && point.same_as.keyframe.valid()) {
+      proposal.same_as.emplace_back(keypoint, point.same_as);
+    } else if (frame->depth[i] > 0) {
+      points.push_back(
+          {keypoint, camera_.unproject(frame->observations[i].pixel, static_cast<double>(frame->depth[i]))});
+    }
+  }
+  pending_.add(proposal.id, frame, proposal.reference, proposal.camera_from_reference, std::move(points));
   reference_ = proposal.id;
   keyframe_decision_.inserted(frame->timestamp_ns, result.camera_from_world);
   return proposal;

@@ -4,49 +4,15 @@
 
 #include <gtest/gtest.h>
 
-#include "map/map.h"
-#include "map/testing/point_world.h"
+#include "localization/testing/ideal_mapper.h"
 
 namespace photoslam {
 namespace {
 
+using testing::IdealMapper;
 using testing::PointWorld;
-
-/// Puts every proposal into a map with exact poses and points, as an ideal mapper would.
-class IdealMapper {
- public:
-  explicit IdealMapper(const PointWorld& world)
-      : world_(world), map_(1.2, 8), landmark_of_point_(world.points.size()) {}
-
-  void add(const KeyframeProposal& proposal, const SE3& true_pose, const std::vector<int>& point_of_keypoint) {
-    map_.add_keyframe(proposal.id, proposal.frame, true_pose);
-    for (size_t i = 0; i < point_of_keypoint.size(); ++i) {
-      const auto point = static_cast<size_t>(point_of_keypoint[i]);
-      LandmarkId& landmark = landmark_of_point_[point];
-      if (landmark.valid()) {
-        map_.add_observation(landmark, proposal.id, static_cast<int>(i));
-        map_.update_view(landmark);
-      } else {
-        landmark = map_.add_landmark(world_.points[point], proposal.id, static_cast<int>(i));
-      }
-    }
-  }
-  std::shared_ptr<const MapSnapshot> snapshot() { return map_.snapshot(); }
-
- private:
-  const PointWorld& world_;
-  Map map_;
-  std::vector<LandmarkId> landmark_of_point_;
-};
-
-struct Error {
-  double position = 0, rotation = 0;
-};
-
-Error pose_error(const SE3& estimate, const SE3& truth) {
-  const SE3 difference = estimate * truth.inverse();
-  return {difference.translation.norm(), so3_log(difference.rotation).norm()};
-}
+using testing::pose_error;
+using testing::PoseError;
 
 class TrackerTest : public ::testing::Test {
  protected:
@@ -56,7 +22,7 @@ class TrackerTest : public ::testing::Test {
     const auto observed = world.observe(truth, frame);
     TrackingResult result = tracker.track(observed, snapshot, map_it);
     if (result.keyframe) {
-      mapper.add(*result.keyframe, truth, world.point_of_keypoint);
+      mapper.add(result.keyframe->id, result.keyframe->frame, truth, world.point_of_keypoint);
       snapshot = mapper.snapshot();
     }
     return result;
@@ -73,7 +39,7 @@ TEST_F(TrackerTest, ExactWorldGivesExactPoses) {
     const SE3 truth = PointWorld::camera_from_world(frame / 30.0);
     const TrackingResult result = step(frame, truth);
     ASSERT_TRUE(result.has_pose) << "frame " << frame << ": " << result.reason;
-    const Error error = pose_error(result.camera_from_world, truth);
+    const PoseError error = pose_error(result.camera_from_world, truth);
     EXPECT_LT(error.position, 1e-4) << "frame " << frame;
     EXPECT_LT(error.rotation, 2e-5) << "frame " << frame;
   }
@@ -103,12 +69,32 @@ TEST_F(TrackerTest, LosesWithAReasonAndFindsTheMapAgain) {
     EXPECT_FALSE(result.reason.empty());
     EXPECT_FALSE(result.keyframe.has_value());
   }
-  const TrackingResult late = step(150, backwards);
+  const TrackingResult late = step(150, backwards, false);
   EXPECT_EQ(late.state, TrackingState::lost) << "after two seconds";
   const SE3 truth = PointWorld::camera_from_world(0.5);
   const TrackingResult found = step(151, truth);
   ASSERT_TRUE(found.has_pose) << found.reason;
   EXPECT_LT(pose_error(found.camera_from_world, truth).position, 1e-3);
+}
+
+TEST_F(TrackerTest, LostForLongItBeginsAnotherMapAndFindsTheOldOneAgain) {
+  for (int frame = 0; frame < 30; ++frame) step(frame, PointWorld::camera_from_world(frame / 30.0));
+  const auto num_keyframes = snapshot->keyframes.size();
+  PointWorld elsewhere(77);
+  const TrackingResult away = tracker.track(elsewhere.observe(SE3{}, 40), snapshot, true);
+  EXPECT_FALSE(away.has_pose);
+  const TrackingResult begun = tracker.track(elsewhere.observe(SE3{}, 120), snapshot, true);
+  ASSERT_TRUE(begun.has_pose) << begun.reason;
+  ASSERT_TRUE(begun.keyframe.has_value());
+  EXPECT_FALSE(begun.keyframe->reference.valid());
+  EXPECT_EQ(begun.keyframe->id, KeyframeId(static_cast<int32_t>(num_keyframes)));
+  EXPECT_GT(begun.camera_from_world.inverse().translation.norm(), 1000) << "worlds that are not connected lie apart";
+
+  const SE3 truth = PointWorld::camera_from_world(0.5);
+  const TrackingResult found = tracker.track(world.observe(truth, 121), snapshot, false);
+  ASSERT_TRUE(found.has_pose) << found.reason;
+  EXPECT_LT(pose_error(found.camera_from_world, truth).position, 1e-3);
+  EXPECT_LT(found.reference, KeyframeId(static_cast<int32_t>(num_keyframes)));
 }
 
 TEST_F(TrackerTest, PosesFollowACorrectionOfTheirReferenceKeyframe) {

@@ -177,7 +177,7 @@ LoopDetector::Search LoopDetector::search(const MapSnapshot& map, std::span<cons
   for (size_t query = 0; query < keypoint_of_query.size(); ++query) {
     const bool found = keypoint_of_query[query] != kNoMatch;
     cells.count(projector_.queries()[query], found);
-    if (found) result.matches.emplace_back(projector_.landmark(query).id, keypoint_of_query[query]);
+    if (found) result.matches.emplace_back(projector_.point(query).landmark, keypoint_of_query[query]);
   }
   result.coverage = cells.share();
   return result;

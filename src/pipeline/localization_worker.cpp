@@ -72,11 +72,14 @@ FrameOutcome LocalizationWorker::process(FedFrame fed, std::shared_ptr<const Map
   outcome.online_camera_from_world = result.camera_from_world;
   outcome.reference = result.reference;
   outcome.camera_from_reference = result.camera_from_reference;
+  const bool is_initial_view = tracker_.initial_view() == frame.id;
+  if (!result.keyframe && !is_initial_view) return outcome;
+  auto images = std::make_shared<KeyframeImages>(KeyframeImages{to_rgb(color), std::move(depth), std::move(right)});
   if (result.keyframe) {
     outcome.keyframe = result.keyframe->id;
-    auto images = std::make_shared<KeyframeImages>(KeyframeImages{to_rgb(color), std::move(depth), std::move(right)});
-    keyframe = NewKeyframe{std::move(*result.keyframe), std::move(images)};
+    keyframe = NewKeyframe{std::move(*result.keyframe), images, std::move(initial_images_)};
   }
+  initial_images_ = is_initial_view ? std::move(images) : nullptr;
   return outcome;
 }
 

@@ -17,6 +17,7 @@ namespace photoslam {
 struct NewKeyframe {
   KeyframeProposal proposal;
   std::shared_ptr<const KeyframeImages> images;
+  std::shared_ptr<const KeyframeImages> initial_images;  ///< Of proposal.initial, if there is one.
 };
 
 /// Everything that happens to a frame before mapping: rectification, features, tracking, and bookkeeping of times.
@@ -42,6 +43,8 @@ class LocalizationWorker {
   FeatureFrameBuilder builder_;
   Tracker tracker_;
   std::optional<int64_t> first_ns_;
+  // Images of the frame that will be the first keyframe should the next frames initialise a map.
+  std::shared_ptr<const KeyframeImages> initial_images_;
 };
 
 }  // namespace photoslam

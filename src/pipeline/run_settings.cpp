@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/run_settings.h"
 
+#include <algorithm>
+#include <map>
+
 namespace photoslam {
 
 std::optional<SE3> camera_from_world(const FrameOutcome& frame, const FrozenMap& map) {
@@ -11,9 +14,26 @@ std::optional<SE3> camera_from_world(const FrameOutcome& frame, const FrozenMap&
   return frame.camera_from_reference * map.keyframes_from_world[static_cast<size_t>(frame.reference.value)];
 }
 
+std::vector<FrameOutcome> connected_frames(const RunOutcome& run) {
+  const auto component = [&run](const FrameOutcome& frame) {
+    const auto reference = static_cast<size_t>(frame.reference.value);
+    return frame.reference.valid() && reference < run.component_of_keyframe.size()
+               ? run.component_of_keyframe[reference]
+               : 0;
+  };
+  std::map<int, int> sizes;
+  for (const FrameOutcome& frame : run.frames) sizes[component(frame)] += frame.has_pose ? 1 : 0;
+  const auto largest = std::ranges::max_element(sizes, {}, [](const auto& entry) { return entry.second; });
+  std::vector<FrameOutcome> frames;
+  for (const FrameOutcome& frame : run.frames) {
+    if (frame.has_pose && component(frame) == largest->first) frames.push_back(frame);
+  }
+  return frames;
+}
+
 Trajectory final_trajectory(const RunOutcome& run) {
   Trajectory trajectory;
-  for (const FrameOutcome& frame : run.frames) {
+  for (const FrameOutcome& frame : connected_frames(run)) {
     if (const auto pose = camera_from_world(frame, run.final)) {
       trajectory.push_back({frame.timestamp_ns, pose->inverse()});
     }
@@ -23,15 +43,15 @@ Trajectory final_trajectory(const RunOutcome& run) {
 
 Trajectory online_trajectory(const RunOutcome& run) {
   Trajectory trajectory;
-  for (const FrameOutcome& frame : run.frames) {
-    if (frame.has_pose) trajectory.push_back({frame.timestamp_ns, frame.online_camera_from_world.inverse()});
+  for (const FrameOutcome& frame : connected_frames(run)) {
+    trajectory.push_back({frame.timestamp_ns, frame.online_camera_from_world.inverse()});
   }
   return trajectory;
 }
 
 Trajectory keyframe_trajectory(const RunOutcome& run) {
   Trajectory trajectory;
-  for (const FrameOutcome& frame : run.frames) {
+  for (const FrameOutcome& frame : connected_frames(run)) {
     if (!frame.keyframe.valid()) continue;
     if (const auto pose = camera_from_world(frame, run.final)) {
       trajectory.push_back({frame.timestamp_ns, pose->inverse()});

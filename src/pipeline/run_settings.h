@@ -69,14 +69,19 @@ struct RunOutcome {
   double mapping_cpu_seconds = 0;
   double seconds_online = 0, seconds_drain = 0, seconds_refine = 0, seconds_total = 0;
   std::vector<RefinementPoint> refinement;
-  bool interrupted = false;  ///< Stopped from outside before the input ended.
-  std::string failure;       ///< "component: what"; empty when all went well.
+  std::vector<int> component_of_keyframe;  ///< [K] See connected_components(); empty: all are connected.
+  bool interrupted = false;                ///< Stopped from outside before the input ended.
+  std::string failure;                     ///< "component: what"; empty when all went well.
 };
 
 /// Pose of a frame in a frozen map; nothing for frames without a pose or whose keyframe the map does not hold.
 std::optional<SE3> camera_from_world(const FrameOutcome& frame, const FrozenMap& map);
 
-/// Poses of all tracked frames in the final map, as published online, and of the keyframes.
+/// The frames whose poses are in the same world as most others: after a loss that was never bridged, the frames on one
+/// side of it have poses that mean nothing to those on the other.
+std::vector<FrameOutcome> connected_frames(const RunOutcome& run);
+
+/// Poses of all connected frames in the final map, as published online, and of the keyframes.
 Trajectory final_trajectory(const RunOutcome& run);
 Trajectory online_trajectory(const RunOutcome& run);
 Trajectory keyframe_trajectory(const RunOutcome& run);

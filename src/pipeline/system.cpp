@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "base/clock.h"
+#include "map/connected_components.h"
 #include "pipeline/localization_worker.h"
 #include "pipeline/mapping_worker.h"
 #include "pipeline/stage.h"
@@ -105,6 +106,9 @@ Stage<NewKeyframe>::Work Session::geometry_work() {
   const auto process = [this](NewKeyframe keyframe) {
     const auto interrupted = [this] { return !logical_time_ && geometry_stage_.backlog() > 0; };
     GeometryUpdate update = geometry_.process(keyframe.proposal, interrupted);
+    if (const auto& initial = keyframe.proposal.initial) {
+      deliver({update.map, initial->id, std::move(keyframe.initial_images)});
+    }
     deliver({std::move(update.map), update.keyframe, std::move(keyframe.images)});
   };
   return {.name = "geometry mapping", .handle = process};
@@ -168,7 +172,8 @@ void Session::localize(FedFrame fed) {
   std::optional<NewKeyframe> keyframe;
   record(localization_.process(std::move(fed), visible_map_, mapping_keeps_up, keyframe));
   if (keyframe) {
-    update_due_.push_back(frame_number_ + options_.pipeline.keyframe_lag_frames);
+    const size_t num_updates = keyframe->proposal.initial ? 2 : 1;
+    update_due_.insert(update_due_.end(), num_updates, frame_number_ + options_.pipeline.keyframe_lag_frames);
     geometry_stage_.post(std::move(*keyframe));
   }
   if (logical_time_) mapping_stage_.post({.update = {}, .iterations = options_.pipeline.iterations_per_frame});
@@ -270,6 +275,7 @@ RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress)
   outcome_.final = mapping_.mapper().freeze();
 
   outcome_.frames = std::move(outcomes_);
+  if (newest_map_) outcome_.component_of_keyframe = connected_components(*newest_map_);
   outcome_.iterations = mapping_.iterations;
   outcome_.mapping_cpu_seconds = mapping_.cpu_seconds;
   outcome_.seconds_total = clock_.seconds();

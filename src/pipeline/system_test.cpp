@@ -6,6 +6,7 @@
 
 #include <cstring>
 
+#include "math/umeyama.h"
 #include "pipeline/frame_rectifier.h"
 #include "pipeline/testing/corner_source.h"
 
@@ -75,6 +76,29 @@ TEST(RunSlam, TracksADistortedStereoRig) {
     // At 3 m, a pixel of disparity is 30 cm of depth; there are hundreds of features with a tenth of that.
     EXPECT_LT(error.translation.norm(), 0.03) << "frame " << frame.frame.value;
   }
+}
+
+TEST(RunSlam, TracksASingleCameraUpToScale) {
+  const RunOutcome outcome = run(CornerSource(60, 320, 240, SensorKind::mono), deterministic(2));
+  ASSERT_EQ(outcome.frames.size(), 60u);
+  std::vector<Vec3> estimate, truth;
+  for (const FrameOutcome& frame : outcome.frames) {
+    if (estimate.empty() && !frame.has_pose) continue;
+    ASSERT_TRUE(frame.has_pose) << frame.frame.value << ": " << frame.reason;
+    estimate.push_back(camera_from_world(frame, outcome.final).value().inverse().translation);
+    truth.push_back(CornerSource::camera_from_world(frame.frame.value).inverse().translation);
+  }
+  EXPECT_GT(estimate.size(), 35u) << "initialised late";
+  const Sim3 truth_from_estimate = align_umeyama(estimate, truth, true);
+  for (size_t i = 0; i < truth.size(); ++i) {
+    EXPECT_LT((truth_from_estimate * estimate[i] - truth[i]).norm(), 0.03) << i;
+  }
+}
+
+TEST(RunSlam, DeterministicRunsOfASingleCameraGiveTheSameBytes) {
+  const RunOutcome one = run(CornerSource(45, 320, 240, SensorKind::mono), deterministic(1));
+  EXPECT_GE(one.final.keyframes_from_world.size(), 2u);
+  expect_same_bytes(one, run(CornerSource(45, 320, 240, SensorKind::mono), deterministic(2)));
 }
 
 TEST(RunSlam, RealTimePaceAccountsForEveryFrame) {

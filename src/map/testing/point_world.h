@@ -26,7 +26,8 @@ class PointWorld {
   double pixel_noise = 0;         ///< σ [px] on octave 0
   double wrong_share = 0;         ///< Features displaced at random.
   double farthest_visible = 1e9;  ///< [m]
-  double flipped_bits = 0;        ///< Share of the bits of each descriptor that differ from view to view.
+  bool with_depth = true;
+  double flipped_bits = 0;  ///< Share of the bits of each descriptor that differ from view to view.
 
   explicit PointWorld(uint64_t seed = 1, int num_points = 10000) : random_(seed) {
     for (int i = 0; i < num_points; ++i) {
@@ -40,7 +41,7 @@ class PointWorld {
     }
   }
 
-  /// What a camera sees, with depth.
+  /// What a camera sees.
   std::shared_ptr<const FeatureFrame> observe(const SE3& camera_from_world, int id, double frames_per_second = 30) {
     auto frame = std::make_shared<FeatureFrame>();
     frame->frame = FrameId(id);
@@ -63,8 +64,11 @@ class PointWorld {
       frame->features.keypoints.push_back(keypoint);
       frame->features.descriptors.push_back(descriptors[i]);
       if (flipped_bits > 0) flip(frame->features.descriptors.back());
-      frame->depth.push_back(static_cast<float>(z));
-      frame->observations.push_back({pixel, pixel.x() - bf / z, 1.0 / (scale * scale)});
+      PixelObservation& observation = frame->observations.emplace_back();
+      observation.pixel = pixel;
+      observation.inverse_variance = 1.0 / (scale * scale);
+      if (with_depth) observation.u_right = pixel.x() - bf / z;
+      frame->depth.push_back(with_depth ? static_cast<float>(z) : 0.0f);
       point_of_keypoint.push_back(static_cast<int>(i));
     }
     frame->grid.build(frame->features.keypoints, camera.width, camera.height);
