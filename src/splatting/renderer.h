@@ -24,8 +24,8 @@ struct RenderResult {
 /// Wall time of the stages of one call [ms].
 struct StageTimes {
   double project = 0;   ///< Culling, projection, colours.
-  double sort = 0;      ///< By depth, then by tile.
-  double forward = 0;   ///< Blending.
+  double sort = 0;      ///< Into tiles.
+  double forward = 0;   ///< Sorting of each tile by depth, blending.
   double loss = 0;      ///< Loss and its gradient image.
   double backward = 0;  ///< Blending, backwards.
   double update = 0;    ///< Sums per gaussian, projection backwards, optimiser.

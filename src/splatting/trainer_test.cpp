@@ -4,9 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "base/check.h"
 #include "splatting/testing/scenes.h"
@@ -292,6 +294,67 @@ TEST_P(Training, PoisonLeavesTheRestClean) {
     trainer.step(scene.model, scene.view, random_target(scene.width, scene.height, 32), options, executor_);
   const RenderResult trained = render(scene.model, scene);
   for (float v : trained.rgb) ASSERT_TRUE(std::isfinite(v));
+}
+
+TEST_P(Training, PoisonedCamerasShowTheBackground) {
+  Scene scene;
+  scene.build(34);
+  Trainer trainer;
+  TrainOptions options;
+  options.render = scene.options;
+  const TargetImage target = random_target(scene.width, scene.height, 35);
+  const std::vector<float> before = all_parameters(scene.model);
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
+  for (const float poison : {kNan, kInf, -kInf, 1e38f})
+    for (int member = 0; member < 6; ++member) {
+      std::vector<Pose> poses = scene.poses;
+      View view{scene.view.camera, poses};
+      float* const intrinsics[] = {&view.camera.fx, &view.camera.fy, &view.camera.cx, &view.camera.cy};
+      for (Pose& pose : poses) {
+        if (member == 4) pose.rotation[0] = static_cast<double>(poison);
+        if (member == 5) pose.translation[2] = static_cast<double>(poison);
+      }
+      if (member < 4) *intrinsics[member] = poison;
+      const StepResult result = trainer.step(scene.model, view, target, options, executor_);
+      EXPECT_EQ(result.visible, 0) << poison << " in member " << member;
+      EXPECT_TRUE(std::isfinite(result.loss));
+      for (float gradient : result.pose_gradient) EXPECT_EQ(gradient, 0);
+    }
+  EXPECT_EQ(before, all_parameters(scene.model));
+}
+
+TEST_P(Training, ManyInOneTileSortByDepthThenIndex) {
+  // Pairs at equal depth: the one with the lower index hides the other.
+  Random random(36);
+  std::vector<Gaussian> gaussians(20000);
+  for (size_t i = 0; i < gaussians.size(); ++i) {
+    Gaussian& g = gaussians[i];
+    g.mean[2] = i % 2 == 0 ? static_cast<float>(random.uniform(1, 50)) : gaussians[i - 1].mean[2];
+    for (float& s : g.log_scale) s = 3;
+    g.opacity_logit = -5;
+    g.sh[0][0] = i % 2 == 0 ? 1.0f : -1.0f;
+  }
+  GaussianModel model;
+  model.add_anchor();
+  model.add(0, gaussians);
+  const std::vector<Pose> poses(1);
+  Renderer renderer;
+  RenderResult image;
+  renderer.render(model, {{1, 1, 1, 1, 0, 0}, poses}, {}, executor_, image);
+  std::vector<size_t> order(gaussians.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t a, size_t b) { return gaussians[a].mean[2] < gaussians[b].mean[2]; });
+  double left = 1, red = 0, depth = 0;
+  for (const size_t i : order) {
+    const double z = static_cast<double>(gaussians[i].mean[2]), alpha = 1 / (1 + std::exp(5.0));
+    if (left * (1 - alpha) <= 1e-4) break;
+    red += left * alpha * std::max(0.0, 0.5 + 0.28209479177387814 * static_cast<double>(gaussians[i].sh[0][0]));
+    depth += left * alpha * z;
+    left *= 1 - alpha;
+  }
+  EXPECT_NEAR(image.rgb[0], red, 2e-5);
+  EXPECT_NEAR(image.depth[0], depth, 2e-3);
 }
 
 TEST_P(Training, DegenerateSizesWork) {

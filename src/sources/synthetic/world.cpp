@@ -9,7 +9,6 @@
 #include "base/check.h"
 #include "sources/synthetic/furniture/workshop.h"
 #include "sources/synthetic/lighting/light_map.h"
-#include "sources/synthetic/room.h"
 
 namespace photoslam {
 
@@ -233,14 +232,6 @@ SceneView SyntheticWorld::render(const Shot& shot, Executor& executor) const {
   });
   view.radiance = soften(view.radiance, executor);
   return view;
-}
-
-std::vector<WorldInfo> synthetic_worlds() { return {{"room", "a furnished living room"}}; }
-
-std::shared_ptr<const SyntheticWorld> make_world(const std::string& name, uint64_t seed, Executor& executor,
-                                                 SceneQuality quality) {
-  PHOTOSLAM_CHECK(name == "room", "'{}'", name);
-  return std::make_shared<const SyntheticRoom>(seed, executor, quality);
 }
 
 }  // namespace photoslam

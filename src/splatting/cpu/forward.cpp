@@ -15,7 +15,7 @@ void render_forward(const GaussianModel& model, const View& view, const RenderOp
   project_model(model, view, options, executor, frame);
   times.project = watch.milliseconds();
   watch.restart();
-  sort_frame(frame);
+  distribute_to_tiles(frame);
   times.sort = watch.milliseconds();
   watch.restart();
   rasterize(executor, frame, result);

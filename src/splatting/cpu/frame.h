@@ -58,7 +58,13 @@ struct TileEntry {
   uint32_t instance;  ///< Where its gradient record lives.
 };
 
-/// The instances (gaussian, tile) of one slot: [first, first + count).
+/// Scratch memory for sorting, of one thread.
+struct TileSorter {
+  std::vector<uint64_t> keys, scratch;
+  std::vector<TileEntry> unsorted;
+};
+
+/// The instances (gaussian, tile) of one slot: [first, first + count), counted from those of its projection task.
 struct InstanceRange {
   uint32_t first, count;
 };
@@ -78,17 +84,21 @@ struct Frame {
   std::vector<std::vector<uint32_t>> task_tiles;  // [projection tasks] tile of each instance, in slot order
   int num_visible = 0;
 
-  Buffer<uint64_t> sort_keys, sort_scratch;  // [visible] depth bits << 32 | slot
-  Buffer<uint32_t> tile_of_instance;         // [instances]
-  std::vector<uint32_t> tile_begin;          // [tiles + 1] into entries
-  Buffer<TileEntry> entries;                 // [instances] by tile, front to back
-  Buffer<uint64_t> cell_masks;               // [instances] cells that an entry contributes to
+  std::vector<uint32_t> task_begin;  // [projection tasks] their first instance
+  std::vector<uint32_t> tile_begin;  // [tiles + 1] into entries
+  Buffer<TileEntry> entries;         // [instances] by tile, front to back
+  Buffer<uint64_t> cell_masks;       // [instances] cells that an entry contributes to
   uint32_t num_instances = 0;
+
+  std::vector<TileSorter> sorters;  // [workers]
 
   Buffer<SplatGradient> gradients;  // [instances]
 
   int num_tiles() const { return tiles_x * tiles_y; }
   int num_ranks() const { return static_cast<int>(blocks.size()); }
+  uint32_t first_instance(size_t slot) const {
+    return instances[slot].first + task_begin[slot / (kBlockSize * kBlocksPerTask)];
+  }
   int num_tasks() const { return (num_ranks() + kBlocksPerTask - 1) / kBlocksPerTask; }
 };
 

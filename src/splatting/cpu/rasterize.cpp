@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "splatting/cpu/sort.h"
 #include "splatting/cpu/targets.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -175,8 +176,11 @@ void rasterize(Executor& executor, Frame& frame, RenderResult& result) {
   result.depth.resize(plane);
   result.alpha.resize(plane);
   result.visible = frame.num_visible;
-  executor.for_each(frame.num_tiles(),
-                    [&](int tile, int) { HWY_DYNAMIC_DISPATCH(rasterize_tile)(frame, tile, result); });
+  frame.sorters.resize(static_cast<size_t>(executor.concurrency()));
+  executor.for_each(frame.num_tiles(), [&](int tile, int worker) {
+    sort_tile(frame, tile, frame.sorters[static_cast<size_t>(worker)]);
+    HWY_DYNAMIC_DISPATCH(rasterize_tile)(frame, tile, result);
+  });
 }
 
 }  // namespace photoslam::splatting

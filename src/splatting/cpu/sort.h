@@ -6,8 +6,11 @@
 
 namespace photoslam::splatting {
 
-/// Lists every tile's gaussians front to back (by fp32 depth, ties by index): one radix sort by depth, then a stable
-/// counting sort by tile. Fills the frame from sort_keys to num_instances.
-void sort_frame(Frame& frame);
+/// Numbers the instances and lists every tile's gaussians, in the order of their slots: a counting sort by tile. Fills
+/// the frame from num_visible to num_instances.
+void distribute_to_tiles(Frame& frame);
+
+/// Sorts a tile's list front to back: by fp32 depth, ties by index.
+void sort_tile(Frame& frame, int tile, TileSorter& sorter);
 
 }  // namespace photoslam::splatting

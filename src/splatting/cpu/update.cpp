@@ -51,7 +51,7 @@ void gather_records(const Frame& frame, size_t rank, float (*rows)[kBlockSize]) 
     const size_t lane = hwy::Num0BitsBelowLS1Bit_Nonzero64(rest);
     const InstanceRange range = frame.instances[rank * kBlockSize + lane];
     alignas(64) float sums[kRecordSize];
-    const float* record = &frame.gradients[range.first].t;
+    const float* record = &frame.gradients[frame.first_instance(rank * kBlockSize + lane)].t;
     __builtin_prefetch(record + kRecordSize * 16);
     for (size_t i = 0; i < kRecordSize; i += kLanes) {
       Vec sum = hn::Load(kFloats, record + i);
@@ -84,6 +84,9 @@ struct BlockGradients {
   alignas(64) float color[3][kBlockSize];
   Mask masks[kParts];  ///< Lanes to use; a part without any holds nothing else.
 
+  HWY_INLINE BlockGradients() {
+    for (Mask& mask : masks) mask = hn::FirstN(kFloats, 0);
+  }
   HWY_INLINE Lanes at(int r, size_t lane) const {
     if (r < row::kSh) return load(geometry[r] + lane);
     const int k = (r - row::kSh) / 3, c = (r - row::kSh) % 3;
@@ -226,7 +229,8 @@ void backward_block(const Frame& frame, size_t rank, const Block& block, const B
   gather_records(frame, rank, rows);
   const AnchorView& view = frame.anchors[static_cast<size_t>(block.anchor)];
   const Lanes half_width(0.5f * static_cast<float>(frame.width)), half_height(0.5f * static_cast<float>(frame.height));
-  Lanes pose_sums[6] = {};
+  Lanes pose_sums[6];
+  for (Lanes& sum : pose_sums) sum = Lanes(0.0f);
   BlockGradients gradients;
   for (size_t i = 0; i < kParts; ++i) {
     const uint64_t bits = frame.visible[rank] >> (i * kLanes);

@@ -41,8 +41,14 @@ void printed_sheet(Workshop& w, const SE3& frame, double width, double height);
 void framed_picture(Workshop& w, const SE3& frame, double width, double height, PictureKind kind, int moulding);
 void floor_lamp(Workshop& w, const SE3& frame);
 
+/// A paper ball on a wire, and its light.
+void pendant_lamp(Workshop& w, const Vec3& position, double ceiling);
+
 /// The room itself: walls, floor, ceiling, window, curtains, door and the lights of the sky and the ceiling.
 void shell(Workshop& w, const Vec3& size);
+
+/// The garden before the window of a shell of this size.
+void hang_backdrop(SceneModel& model, const Vec3& size, uint64_t seed, Executor& executor);
 
 /// Furnishes the whole room.
 SceneModel furnish_room(uint64_t seed, const Vec3& size, SceneQuality quality, Executor& executor);

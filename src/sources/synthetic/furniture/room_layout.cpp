@@ -127,13 +127,17 @@ SceneModel furnish_room(uint64_t seed, const Vec3& size, SceneQuality quality, E
   wall_things(w, size);
 
   SceneModel model = std::move(w).finish(executor);
+  hang_backdrop(model, size, seed, executor);
+  return model;
+}
+
+void hang_backdrop(SceneModel& model, const Vec3& size, uint64_t seed, Executor& executor) {
   constexpr float kWidth = 14, kHeight = 8;
   model.backdrop = Texture::paint(kWidth, kHeight, 90, garden(kWidth, kHeight, static_cast<uint32_t>(seed)), executor);
   const float x = static_cast<float>(size.x()) + 3.5f;
   model.backdrop_corner = Vec3f(x, 9, 5.6f);
   model.backdrop_right = Vec3f(0, -kWidth, 0);
   model.backdrop_down = Vec3f(0, 0, -kHeight);
-  return model;
 }
 
 }  // namespace photoslam::synthetic

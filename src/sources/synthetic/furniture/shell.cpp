@@ -139,6 +139,8 @@ void ceiling_beams(Workshop& w, const Vec3& size) {
   }
 }
 
+}  // namespace
+
 void pendant_lamp(Workshop& w, const Vec3& position, double ceiling) {
   const int paper = w.material(0.9f, 0.5f, 300, curtain(rgb(0xFBF3E2), w.seed()), {.gloss = 0, .emission = 0.75f});
   constexpr double kRadius = 0.2;
@@ -150,8 +152,6 @@ void pendant_lamp(Workshop& w, const Vec3& position, double ceiling) {
                             .radius = static_cast<float>(kRadius),
                             .radiance = Color(9.5f, 8.1f, 6.0f, 0)});
 }
-
-}  // namespace
 
 void shell(Workshop& w, const Vec3& size) {
   walls(w, size);
