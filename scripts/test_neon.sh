@@ -23,6 +23,7 @@ mkdir -p "$build/include" "$build/objects"
 for package in hwy fmt; do ln -sfn "/usr/include/$package" "$build/include/$package"; done
 
 cat >"$build/rules.ninja" <<RULES
+builddir = $build
 rule cxx
   command = $compiler -std=c++20 -O2 -ffp-contract=off -Wall -Wextra -Werror -DFMT_HEADER_ONLY -DHWY_COMPILE_ONLY_STATIC -DHWY_DISABLE_FUTEX -Isrc -isystem $build/include -isystem $googletest/include -isystem $googletest -MD -MF \$out.d -c \$in -o \$out
   depfile = \$out.d
