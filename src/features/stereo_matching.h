@@ -39,6 +39,9 @@ class StereoMatcher {
     std::vector<uint8_t> pixels;
     GreyView view;
     void build(const GreyView& grey);
+
+   private:
+    std::vector<int16_t> columns_;
   };
   struct Candidate {
     int column = -1;
