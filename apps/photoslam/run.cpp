@@ -141,7 +141,14 @@ void add_run(CommandLine& line) {
   command.add_option("--format", a.source.format, "Layout of the sequence")
       ->check(CLI::IsMember(formats))
       ->capture_default_str();
-  command.add_option("--camera", a.source.camera, "camera.yaml to use instead of the sequence's own calibration");
+  command.add_option("--camera", a.source.camera,
+                     "Calibration to use instead of the sequence's own: camera.yaml, OpenCV, ORB-SLAM, "
+                     "EuRoC's sensor.yaml or KITTI's calib.txt");
+  command
+      .add_option("--fov", a.source.fov_deg, "Without a calibration: guess one of this horizontal field of view [deg]")
+      ->check(CLI::Range(5.0, 170.0));
+  command.add_option("--fps", a.source.frames_per_second, "Rate of the images of a folder [Hz]")
+      ->check(CLI::Range(0.01, 10000.0));
   command.add_option("--output", a.output, "Folder for the results")->capture_default_str();
   command.add_option("--pace", a.pace, "Release frames at their timestamps, or as fast as they are tracked")
       ->check(CLI::IsMember({"realtime", "asap"}))

@@ -19,6 +19,8 @@ Status write_run_description(const fs::path& folder, const RunDescription& descr
       {"dataset", fs::absolute(description.dataset).string()},
       {"format", description.source.format},
       {"sensor", description.source.sensor ? sensor_name(*description.source.sensor) : "auto"},
+      {"fov_deg", description.source.fov_deg},
+      {"frames_per_second", description.source.frames_per_second},
       {"camera_file", description.source.camera.string()},
       {"camera", {{"width", c.width}, {"height", c.height}, {"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}}},
       {"hold_out", description.hold_out}};
@@ -37,6 +39,8 @@ Result<RunDescription> read_run_description(const fs::path& folder) {
     const auto sensor = parse_sensor(json.value("sensor", "auto"));
     if (!sensor) return error("{}: {}", path.string(), sensor.error().message);
     description.source.sensor = *sensor;
+    description.source.fov_deg = json.value("fov_deg", 0.0);
+    description.source.frames_per_second = json.value("frames_per_second", 0.0);
     description.source.camera = json.at("camera_file").get<std::string>();
     const auto& camera = json.at("camera");
     description.camera = {camera.at("width"), camera.at("height"), camera.at("fx"),

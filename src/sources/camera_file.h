@@ -8,6 +8,7 @@
 #include "base/result.h"
 #include "camera/distortion.h"
 #include "camera/pinhole.h"
+#include "sources/frame.h"
 
 namespace photoslam {
 
@@ -16,7 +17,8 @@ struct CameraFile {
   PinholeCamera camera;
   Distortion distortion;
   std::optional<double> frames_per_second;
-  std::optional<double> depth_scale;  ///< Stored depth value / depth_scale = metres.
+  std::optional<double> depth_scale;      ///< Stored depth value / depth_scale = metres.
+  std::optional<RightCamera> right = {};  ///< Of stereo rigs, where the file tells.
 };
 
 /// Reads `camera.yaml`: width, height, fx, fy, cx, cy [px], and optionally model (pinhole or fisheye), distortion (a

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sources/euroc_source.h"
 
+#include "sources/calibration/calibration.h"
 #include "sources/calibration/euroc_sensor.h"
 #include "sources/image_list_source.h"
 #include "sources/sensor_choice.h"
@@ -44,15 +45,9 @@ Result<std::vector<ListedFrame>> list_frames(const fs::path& folder, SensorKind 
 /// Fills in camera, distortion, right camera and frame rate.
 Status calibrate(const fs::path& folder, const fs::path& camera_file, SourceInfo& info) {
   if (!camera_file.empty()) {
-    const Result<CameraFile> file = read_camera_yaml(camera_file);
+    const Result<CameraFile> file = read_calibration(camera_file);
     if (!file) return file.error();
-    if (info.sensor == SensorKind::stereo) {
-      return error("{} describes one camera, and {} is stereo; add --sensor mono", camera_file.string(), info.name);
-    }
-    info.camera = file->camera;
-    info.distortion = file->distortion;
-    info.frames_per_second = file->frames_per_second.value_or(0);
-    return {};
+    return apply_camera(*file, camera_file.string(), info);
   }
   const Result<EurocSensor> left = read_euroc_sensor(folder / "cam0" / "sensor.yaml");
   if (!left) return left.error();

@@ -113,6 +113,13 @@ void set_depth_unit(std::optional<double> depth_scale, double usual, SourceInfo&
   info.metres_per_depth_unit = 1 / depth_scale.value_or(usual);
 }
 
+Result<FrameSize> image_size(const std::vector<ListedFrame>& frames) {
+  for (const ListedFrame& frame : frames) {
+    if (const Result<ImageU8> image = read_image(frame.color)) return FrameSize{image->width(), image->height()};
+  }
+  return error("none of the {} listed images can be read", frames.size());
+}
+
 Result<std::unique_ptr<FrameSource>> make_image_list_source(SourceInfo info, std::vector<ListedFrame> frames) {
   for (size_t i = 1; i < frames.size(); ++i) {
     PHOTOSLAM_CHECK(frames[i - 1].timestamp_ns < frames[i].timestamp_ns, "frame {}", i);
@@ -127,6 +134,14 @@ Result<std::unique_ptr<FrameSource>> make_image_list_source(SourceInfo info, std
   if (!missing.empty()) {
     info.notes.push_back(fmt::format("{} of {} listed frames lack a file and count as lost: {}",
                                      frames.size() - complete, frames.size(), name_some(missing)));
+  }
+  if (info.camera.width == 0 || (info.right && info.right->camera.width == 0)) {
+    const Result<FrameSize> size = image_size(frames);
+    if (!size) return error("{}: {}", info.name, size.error().message);
+    for (PinholeCamera* camera : {&info.camera, info.right ? &info.right->camera : &info.camera}) {
+      if (camera->width == 0) camera->width = size->width;
+      if (camera->height == 0) camera->height = size->height;
+    }
   }
   if (const Status status = check_image_size(info, frames); !status) return status.error();
   if (info.frames_per_second <= 0) info.frames_per_second = frame_rate(frames);

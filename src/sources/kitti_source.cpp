@@ -4,9 +4,8 @@
 
 #include <algorithm>
 
-#include "io/image_file.h"
+#include "sources/calibration/calibration.h"
 #include "sources/calibration/kitti_calib.h"
-#include "sources/camera_file.h"
 #include "sources/image_list_source.h"
 #include "sources/sensor_choice.h"
 #include "sources/timed_list.h"
@@ -72,14 +71,6 @@ Result<std::vector<ListedFrame>> list_frames(const KittiSequence& sequence, Sens
   return frames;
 }
 
-/// Size of the first image that can be read: calib.txt does not tell it.
-Result<std::pair<int, int>> image_size(const std::vector<ListedFrame>& frames) {
-  for (const ListedFrame& frame : frames) {
-    if (const Result<ImageU8> image = read_image(frame.color)) return std::pair(image->width(), image->height());
-  }
-  return error("none of the {} images from {} on can be read", frames.size(), frames.front().color.string());
-}
-
 }  // namespace
 
 Result<KittiSequence> find_kitti_sequence(const fs::path& folder) {
@@ -119,13 +110,9 @@ Result<std::unique_ptr<FrameSource>> open_kitti(const fs::path& folder, const So
   if (!frames) return frames.error();
 
   if (!options.camera.empty()) {
-    const Result<CameraFile> file = read_camera_yaml(options.camera);
+    const Result<CameraFile> file = read_calibration(options.camera);
     if (!file) return file.error();
-    if (info.sensor == SensorKind::stereo) {
-      return error("{} describes one camera, and {} is stereo; add --sensor mono", options.camera.string(), info.name);
-    }
-    info.camera = file->camera;
-    info.distortion = file->distortion;
+    if (Status status = apply_camera(*file, options.camera.string(), info); !status) return status.error();
     return make_image_list_source(std::move(info), std::move(*frames));
   }
   const fs::path calib = sequence->folder / "calib.txt";
@@ -133,10 +120,8 @@ Result<std::unique_ptr<FrameSource>> open_kitti(const fs::path& folder, const So
   if (!cameras) return cameras.error();
   const Result<KittiCamera> left = find_camera(*cameras, sequence->left_camera, calib);
   if (!left) return left.error();
-  const auto size = image_size(*frames);
-  if (!size) return error("{}: {}", info.name, size.error().message);
-  const auto pinhole = [&size](const KittiCamera& camera) {
-    return PinholeCamera{size->first, size->second, camera.fx, camera.fy, camera.cx, camera.cy};
+  const auto pinhole = [](const KittiCamera& camera) {
+    return PinholeCamera{0, 0, camera.fx, camera.fy, camera.cx, camera.cy};  // calib.txt does not tell the size
   };
   info.camera = pinhole(*left);
   if (info.sensor == SensorKind::stereo) {

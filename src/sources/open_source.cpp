@@ -6,6 +6,7 @@
 
 #include "base/nearest_name.h"
 #include "sources/euroc_source.h"
+#include "sources/folder_source.h"
 #include "sources/kitti_source.h"
 #include "sources/replica_source.h"
 #include "sources/tum_source.h"
@@ -21,12 +22,13 @@ struct Format {
   Result<std::unique_ptr<FrameSource>> (*open)(const fs::path& folder, const SourceOptions& options);
 };
 
-const std::array<Format, 4>& formats() {
-  static const std::array<Format, 4> kFormats = {{
+const std::array<Format, 5>& formats() {
+  static const std::array<Format, 5> kFormats = {{
       {"tum", internal::looks_like_tum, internal::open_tum},
       {"euroc", internal::looks_like_euroc, internal::open_euroc},
       {"kitti", internal::looks_like_kitti, internal::open_kitti},
       {"replica", internal::looks_like_replica, internal::open_replica},
+      {"images", internal::looks_like_images, internal::open_images},
   }};
   return kFormats;
 }
@@ -68,7 +70,7 @@ Result<std::unique_ptr<FrameSource>> open_source(const fs::path& path, const Sou
   }
   return error(
       "cannot tell the format of {}: found neither associations.txt nor rgb.txt (TUM RGB-D), nor mav0/cam0/data.csv "
-      "(EuRoC), nor calib.txt with image_0 or image_2 (KITTI), nor results/frame*.jpg (Replica)",
+      "(EuRoC), nor calib.txt with image_0 or image_2 (KITTI), nor results/frame*.jpg (Replica), nor images",
       path.string());
 }
 

@@ -16,6 +16,8 @@ namespace photoslam {
 struct SourceOptions {
   std::string format = "auto";            ///< "auto" or one of source_formats().
   std::filesystem::path camera = {};      ///< A calibration to use instead of the dataset's own; empty = its own.
+  double fov_deg = 0;                     ///< Horizontal field of view for a guess where there is no calibration.
+  double frames_per_second = 0;           ///< Of image folders; 0 = the calibration's, or 30.
   std::optional<SensorKind> sensor = {};  ///< Guessed from the data where not given.
 };
 

@@ -164,7 +164,7 @@ TEST_F(OpenSourceTest, SaysWhatItLookedFor) {
   write("notes.txt", "rgb");
   EXPECT_THAT(failure(), HasSubstr("cannot tell the format"));
   EXPECT_THAT(failure({.format = "tam"}), HasSubstr("unknown format 'tam' (did you mean 'tum'?)"));
-  EXPECT_THAT(failure({.format = "tum"}), HasSubstr("has no camera.yaml"));
+  EXPECT_THAT(failure({.format = "tum"}), HasSubstr("rgb.txt"));
   EXPECT_THAT(failure({.format = "replica"}), HasSubstr("cam_params.json"));
   EXPECT_THAT(open_source(folder / "notes.txt").error().message, HasSubstr("is a file"));
   EXPECT_THAT(open_source(folder / "absent").error().message, HasSubstr("does not exist"));

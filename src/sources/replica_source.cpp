@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/file.h"
-#include "sources/camera_file.h"
+#include "sources/calibration/calibration.h"
 #include "sources/image_list_source.h"
 #include "sources/sensor_choice.h"
 
@@ -92,7 +92,7 @@ Result<CameraFile> read_cam_params(const fs::path& path) {
 }
 
 Result<CameraFile> find_camera(const fs::path& scene, const fs::path& chosen) {
-  if (!chosen.empty()) return read_camera_yaml(chosen);
+  if (!chosen.empty()) return read_calibration(chosen);
   for (const fs::path& path : {scene / "cam_params.json", scene.parent_path() / "cam_params.json"}) {
     if (fs::exists(path)) return read_cam_params(path);
   }

@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "sources/camera_file.h"
+#include "sources/calibration/calibration.h"
 #include "sources/image_list_source.h"
 #include "sources/sensor_choice.h"
 #include "sources/timed_list.h"
@@ -81,15 +81,23 @@ std::optional<CameraFile> known_camera(const fs::path& folder) {
   return std::nullopt;
 }
 
-Result<CameraFile> find_camera(const fs::path& folder, const fs::path& chosen, std::vector<std::string>& notes) {
-  if (!chosen.empty()) return read_camera_yaml(chosen);
-  if (fs::exists(folder / "camera.yaml")) return read_camera_yaml(folder / "camera.yaml");
+Result<CameraFile> find_camera(const fs::path& folder, const SourceOptions& options,
+                               const std::vector<ListedFrame>& frames, std::vector<std::string>& notes) {
+  if (!options.camera.empty()) return read_calibration(options.camera);
+  if (fs::exists(folder / "camera.yaml")) return read_calibration(folder / "camera.yaml");
   if (const std::optional<CameraFile> known = known_camera(folder)) {
     notes.push_back(
         fmt::format("no camera.yaml: using the calibration published for the TUM RGB-D benchmark's camera, "
                     "chosen by the folder's name (fx = {}, fy = {})",
                     known->camera.fx, known->camera.fy));
     return *known;
+  }
+  if (options.fov_deg > 0) {
+    const auto size = image_size(frames);
+    if (!size) return size.error();
+    Result<std::optional<CameraFile>> guess = chosen_camera({}, options.fov_deg, size->width, size->height, notes);
+    if (!guess) return guess.error();
+    return std::move(guess->value());
   }
   return error(
       "{} has no camera.yaml; write one with width, height, fx, fy, cx, cy and depth_scale, or name one with --camera",
@@ -113,11 +121,11 @@ Result<std::unique_ptr<FrameSource>> open_tum(const fs::path& folder, const Sour
   const Result<SensorKind> sensor = choose_sensor(options.sensor, available, info.name);
   if (!sensor) return sensor.error();
   info.sensor = *sensor;
-  const Result<CameraFile> camera = find_camera(folder, options.camera, info.notes);
-  if (!camera) return camera.error();
   Result<std::vector<ListedFrame>> frames =
       associations ? read_associations(*associations) : match_lists(folder, info.sensor, info.notes);
   if (!frames) return frames.error();
+  const Result<CameraFile> camera = find_camera(folder, options, *frames, info.notes);
+  if (!camera) return camera.error();
 
   info.camera = camera->camera;
   info.distortion = camera->distortion;
