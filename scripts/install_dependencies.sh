@@ -12,6 +12,7 @@ build_packages=(
   libeigen3-dev libhwy-dev libfmt-dev libjpeg-dev libpng-dev zlib1g-dev
   libcli11-dev libtomlplusplus-dev libyaml-cpp-dev nlohmann-json3-dev
   libembree-dev
+  libavformat-dev libavcodec-dev libswscale-dev  # for the module that reads video files
 )
 test_packages=(libgtest-dev libgmock-dev libbenchmark-dev libceres-dev)
 lint_packages=(clang-format-19 clang-tidy-19 libgtest-dev libgmock-dev)

@@ -63,6 +63,23 @@ void announce(const SourceInfo& info, const RunArguments& arguments) {
   fmt::print(stderr, "writing to {}\n", arguments.output.string());
 }
 
+/// What is left of a camera after the run: nothing to compare the map with.
+class NoFrames final : public FrameSource {
+ public:
+  explicit NoFrames(SourceInfo info) : info_(std::move(info)) {}
+  const SourceInfo& info() const override { return info_; }
+  std::optional<Frame> next() override { return std::nullopt; }
+
+ private:
+  SourceInfo info_;
+};
+
+Result<std::unique_ptr<FrameSource>> reopen(const fs::path& path, const SourceOptions& options,
+                                            const SourceInfo& info) {
+  if (is_camera(path)) return std::unique_ptr<FrameSource>(std::make_unique<NoFrames>(info));
+  return open_source(path, options);
+}
+
 /// Trajectories and map are on disk before anything is measured.
 Status save_and_evaluate(const RunArguments& arguments, const SystemOptions& options, const RunSettings& settings,
                          const SourceInfo& info, const RunOutcome& run) {
@@ -72,7 +89,7 @@ Status save_and_evaluate(const RunArguments& arguments, const SystemOptions& opt
   if (Status status = write_run_description(arguments.output, description); !status) return status;
   if (Status status = write_run_results(arguments.output, run, map_bytes); !status) return status;
 
-  auto source = open_source(arguments.dataset, description.source);
+  auto source = reopen(arguments.dataset, description.source, info);
   if (!source) return source.error();
   std::optional<Trajectory> truth;
   if (const auto path = find_ground_truth(arguments.dataset)) {
@@ -127,9 +144,12 @@ void add_run(CommandLine& line) {
   CLI::App& command = line.add("run", "Track a sequence and map it photorealistically",
                                "  photoslam run rgbd_dataset_freiburg1_desk --output output/desk\n"
                                "  photoslam run Replica/office0 --refine-seconds 30\n"
+                               "  photoslam run holiday.mp4 --fov 70\n"
+                               "  photoslam run camera:0 --camera webcam.yaml\n"
                                "  photoslam run my_sequence --deterministic --seed 7 --hold-out 8\n");
   RunArguments& a = *arguments;
-  command.add_option("dataset", a.dataset, "Folder of the sequence")->required();
+  command.add_option("dataset", a.dataset, "Folder of the sequence or of images, video file, or camera (camera:0)")
+      ->required();
   command
       .add_option("--sensor", a.sensor,
                   "Sensor of the sequence; auto takes all it has, mono leaves depth or the right "

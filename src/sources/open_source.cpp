@@ -10,6 +10,8 @@
 #include "sources/kitti_source.h"
 #include "sources/replica_source.h"
 #include "sources/tum_source.h"
+#include "sources/video/video_source.h"
+#include "sources/webcam/webcam_source.h"
 
 namespace photoslam {
 namespace {
@@ -59,7 +61,12 @@ std::vector<std::string> source_formats() {
   return names;
 }
 
+bool is_camera(const fs::path& path) { return internal::camera_device(path.string()).has_value(); }
+
 Result<std::unique_ptr<FrameSource>> open_source(const fs::path& path, const SourceOptions& options) {
+  if (const auto device = internal::camera_device(path.string())) return internal::open_webcam(*device, options);
+  std::error_code ignored;
+  if (fs::is_regular_file(path, ignored) && options.format == "auto") return internal::open_video(path, options);
   if (const Status status = check_folder(path); !status) return status.error();
   for (const Format& format : formats()) {
     if (options.format == format.name) return format.open(path, options);

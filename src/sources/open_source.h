@@ -24,7 +24,11 @@ struct SourceOptions {
 /// Names of the layouts that can be read.
 std::vector<std::string> source_formats();
 
-/// Opens a dataset for reading. Images are read one by one as they are asked for.
+/// Whether the path names a camera, whose frames cannot be read twice.
+bool is_camera(const std::filesystem::path& path);
+
+/// Opens the folder of a dataset, a video file, or a camera ("camera:0", "/dev/video0") for reading. Images are read
+/// one by one as they are asked for.
 ///
 /// The error says what was looked for where nothing fits. SourceInfo::notes tells what was guessed or is missing.
 Result<std::unique_ptr<FrameSource>> open_source(const std::filesystem::path& path, const SourceOptions& options = {});

@@ -166,7 +166,7 @@ TEST_F(OpenSourceTest, SaysWhatItLookedFor) {
   EXPECT_THAT(failure({.format = "tam"}), HasSubstr("unknown format 'tam' (did you mean 'tum'?)"));
   EXPECT_THAT(failure({.format = "tum"}), HasSubstr("rgb.txt"));
   EXPECT_THAT(failure({.format = "replica"}), HasSubstr("cam_params.json"));
-  EXPECT_THAT(open_source(folder / "notes.txt").error().message, HasSubstr("is a file"));
+  EXPECT_THAT(open_source(folder / "notes.txt").error().message, HasSubstr("notes.txt"));
   EXPECT_THAT(open_source(folder / "absent").error().message, HasSubstr("does not exist"));
 }
 
