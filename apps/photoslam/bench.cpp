@@ -18,6 +18,7 @@
 #include "photorealistic_mapping/view_geometry.h"
 #include "photorealistic_mapping/world_export.h"
 #include "sources/posed_cameras.h"
+#include "splatting/testing/simd_targets.h"
 
 namespace photoslam {
 namespace {
@@ -32,6 +33,7 @@ struct BenchArguments {
   int threads = 0;
   double zoom = 1.0;
   int rounds = 4;
+  std::string simd;
   bool json = false;
 };
 
@@ -117,10 +119,25 @@ void print_table(const nlohmann::ordered_json& figures) {
   }
 }
 
+/// Makes the engine use the named SIMD target as long as the result lives; empty: what the machine does best.
+Result<std::unique_ptr<splatting::testing::ScopedSimdTarget>> choose_simd(const std::string& name) {
+  std::unique_ptr<splatting::testing::ScopedSimdTarget> chosen;
+  std::string available;
+  for (const int64_t target : splatting::testing::simd_targets()) {
+    const std::string candidate = splatting::testing::simd_target_name(target);
+    available += " " + candidate;
+    if (candidate == name) chosen = std::make_unique<splatting::testing::ScopedSimdTarget>(target);
+  }
+  if (!name.empty() && chosen == nullptr) return error("--simd {}: this machine has{}", name, available);
+  return chosen;
+}
+
 Status bench_splat(const BenchArguments& arguments) {
   const double rss_at_start_mb = current_rss_mb();
   const int threads =
       arguments.threads > 0 ? arguments.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const auto simd = choose_simd(arguments.simd);
+  if (!simd) return simd.error();
   splatting::GaussianModel model;
   double file_mb = 0;
   {
@@ -159,6 +176,7 @@ void add_bench(CommandLine& line) {
   command.add_option("--threads", a.threads, "Threads; 0: one per core")->check(CLI::Range(0, 1024));
   command.add_option("--zoom", a.zoom, "Multiplies the focal lengths")->check(CLI::Range(0.01, 1000.0));
   command.add_option("--rounds", a.rounds, "Training steps per camera")->check(CLI::Range(1, 100000));
+  command.add_option("--simd", a.simd, "SIMD target: AVX3, AVX2, SSE4 or NEON; default: the best this machine has");
   command.add_flag("--json", a.json, "Print JSON");
   line.on_run(command, [arguments] { return bench_splat(*arguments); });
 }

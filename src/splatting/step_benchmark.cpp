@@ -5,6 +5,7 @@
 #include <benchmark/benchmark.h>
 
 #include <cmath>
+#include <utility>
 
 #include "base/random.h"
 #include "splatting/renderer.h"
@@ -35,8 +36,8 @@ GaussianModel make_cloud(int count) {
   return model;
 }
 
-Camera camera_of(int width) {
-  const int height = width * 3 / 4;
+Camera camera_of(const benchmark::State& state) {
+  const int width = static_cast<int>(state.range(1)), height = static_cast<int>(state.range(2));
   const float f = 0.9f * static_cast<float>(width);
   return {width, height, f, f, 0.5f * static_cast<float>(width), 0.5f * static_cast<float>(height)};
 }
@@ -47,14 +48,13 @@ void BM_Render(benchmark::State& state) {
   SerialExecutor executor;
   Renderer renderer;
   RenderResult image;
-  for (auto _ : state)
-    renderer.render(model, {camera_of(static_cast<int>(state.range(1))), poses}, {}, executor, image);
+  for (auto _ : state) renderer.render(model, {camera_of(state), poses}, {}, executor, image);
   state.counters["visible"] = image.visible;
 }
 
 void BM_Step(benchmark::State& state) {
   GaussianModel model = make_cloud(static_cast<int>(state.range(0)));
-  const Camera camera = camera_of(static_cast<int>(state.range(1)));
+  const Camera camera = camera_of(state);
   Random random(2);
   std::vector<uint8_t> rgb(static_cast<size_t>(camera.width) * static_cast<size_t>(camera.height) * 3);
   for (uint8_t& v : rgb) v = static_cast<uint8_t>(random.index(256));
@@ -67,17 +67,17 @@ void BM_Step(benchmark::State& state) {
   state.counters["visible"] = result.visible;
 }
 
-#define SPLATTING_SIZES      \
-  ->Args({1000, 640})        \
-      ->Args({10000, 640})   \
-      ->Args({100000, 640})  \
-      ->Args({100000, 160})  \
-      ->Args({100000, 320})  \
-      ->Args({100000, 1280}) \
-      ->Args({1000000, 640}) \
-      ->Unit(benchmark::kMillisecond)
-BENCHMARK(BM_Render) SPLATTING_SIZES;
-BENCHMARK(BM_Step) SPLATTING_SIZES;
+/// One curve over the gaussians, one over the pixels.
+void sizes(benchmark::internal::Benchmark* benchmark) {
+  for (const int count : {1000, 10000, 100000, 500000, 1000000, 2000000}) benchmark->Args({count, 640, 480});
+  for (const auto& [width, height] : {std::pair{160, 120}, {320, 240}, {1280, 720}, {1920, 1080}})
+    benchmark->Args({100000, width, height});
+  benchmark->Unit(benchmark::kMillisecond);
+}
+BENCHMARK(BM_Render)->Apply(sizes);
+BENCHMARK(BM_Step)->Apply(sizes);
+// Seven gigabytes of model: only on demand.
+BENCHMARK(BM_Render)->Name("TenMillion")->Args({10000000, 640, 480})->Iterations(1)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace photoslam::splatting
