@@ -22,7 +22,7 @@ from pathlib import Path
 BINARY = os.environ["PHOTOSLAM_BINARY"]
 SEQUENCE = Path(os.environ.get("PHOTOSLAM_SEQUENCE", "no sequence"))
 SOURCE_DIR = Path(os.environ.get("PHOTOSLAM_SOURCE_DIR", Path(__file__).resolve().parents[2]))
-COMMANDS = ["run", "eval", "render", "export", "synth", "doctor", "config"]
+COMMANDS = ["run", "eval", "render", "export", "train", "synth", "doctor", "config"]
 FAST = ["--pace", "asap", "--set", "pipeline.iterations_per_frame=1"]
 
 

@@ -17,5 +17,6 @@ void add_bench(CommandLine& line);
 void add_doctor(CommandLine& line);
 void add_config(CommandLine& line);
 void add_export(CommandLine& line);
+void add_train(CommandLine& line);
 
 }  // namespace photoslam

@@ -2,16 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <map>
 #include <memory>
 
 #include "base/file.h"
 #include "commands.h"
-#include "evaluation/frame_log.h"
 #include "io/gaussian_spz.h"
 #include "io/image_file.h"
-#include "pipeline/frame_rectifier.h"
-#include "run_folder.h"
+#include "run_images.h"
 #include "sources/posed_cameras.h"
 
 namespace photoslam {
@@ -49,24 +46,14 @@ std::vector<SparsePoint> sparse_points(const GaussianTable& map) {
 
 /// Writes the rectified pictures of the run's keyframes into `images` and says where they were taken.
 Result<std::vector<PosedCamera>> write_keyframe_images(const fs::path& run, const fs::path& images) {
-  const auto description = read_run_description(run);
-  if (!description) return description.error();
-  const auto keyframes = read_tum_trajectory(run / "keyframes.tum");
-  if (!keyframes) return keyframes.error();
-  auto source = open_source(description->dataset, description->source);
-  if (!source) return source.error();
   if (Status status = prepare_output_folder(images); !status) return status.error();
-  std::map<int64_t, SE3> pose_at;
-  for (const StampedPose& pose : *keyframes) pose_at[pose.timestamp_ns] = pose.world_from_camera.inverse();
-  const FrameRectifier rectifier((*source)->info());
   std::vector<PosedCamera> cameras;
-  while (auto frame = (*source)->next()) {
-    const auto pose = pose_at.find(frame->timestamp_ns);
-    if (pose == pose_at.end() || !frame->defect.empty()) continue;
-    const fs::path image = images / fmt::format("{:06}.png", frame->id.value);
-    if (Status status = write_png(image, rectifier.color(std::move(frame->color))); !status) return status.error();
-    cameras.push_back({rectifier.camera(), pose->second, image});
-  }
+  const Status status = for_each_keyframe_image(run, [&](FrameId id, PosedCamera camera, const ImageU8& image) {
+    camera.image = images / fmt::format("{:06}.png", id.value);
+    cameras.push_back(camera);
+    return write_png(camera.image, image);
+  });
+  if (!status) return status.error();
   return cameras;
 }
 

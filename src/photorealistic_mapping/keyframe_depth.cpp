@@ -16,7 +16,8 @@ void KeyframeDepthOptions::visit(OptionVisitor& v) {
   v.group("sweep", "The plane sweep.", sweep);
 }
 
-std::optional<DepthRange> landmark_depth_range(const MapSnapshot& map, const Keyframe& keyframe) {
+std::optional<DepthRange> search_range(const MapSnapshot& map, const KeyframeView& view) {
+  const Keyframe& keyframe = view.keyframe;
   constexpr size_t kMinLandmarks = 20;
   std::vector<double> depths;
   for (LandmarkId id : keyframe.landmarks) {
@@ -25,6 +26,7 @@ std::optional<DepthRange> landmark_depth_range(const MapSnapshot& map, const Key
     const double depth = (keyframe.camera_from_world * landmark->position).z();
     if (depth > 0) depths.push_back(depth);
   }
+  if (depths.empty() && view.median_depth > 0) return DepthRange{0.25 * view.median_depth, 6 * view.median_depth};
   if (depths.size() < kMinLandmarks) return std::nullopt;
   std::ranges::sort(depths);
   // Landmarks lie where there is texture; surfaces between them may be somewhat nearer, and much farther.

@@ -20,8 +20,9 @@ struct KeyframeDepthOptions {
   void visit(OptionVisitor& visitor);
 };
 
-/// Depths in which a keyframe's picture is searched, from those of its landmarks; nothing when it has too few.
-std::optional<DepthRange> landmark_depth_range(const MapSnapshot& map, const Keyframe& keyframe);
+/// Depths in which a keyframe's picture is searched, from those of its landmarks; without any landmarks around the
+/// median depth; nothing when it has too few of them to tell.
+std::optional<DepthRange> search_range(const MapSnapshot& map, const KeyframeView& view);
 
 /// Covisible keyframes from whose pictures depth can be swept: seen from the scene's median depth they are far enough
 /// apart to measure and near enough to match; the most covisible first, at most `options.neighbours`, only those before

@@ -9,6 +9,7 @@
 #include "image/convert.h"
 #include "math/median.h"
 #include "photorealistic_mapping/view_geometry.h"
+#include "photorealistic_mapping/world_export.h"
 
 namespace photoslam {
 namespace {
@@ -113,7 +114,7 @@ void PhotorealisticMapper::seed_keyframe(const MapSnapshot& map, size_t view, Ex
 void PhotorealisticMapper::sweep_picture(const MapSnapshot& map, size_t index, Executor& executor) {
   TrainingView& view = views_[index];
   const KeyframeId id(static_cast<int32_t>(index));
-  const auto range = landmark_depth_range(map, map.keyframe(id).keyframe);
+  const auto range = search_range(map, map.keyframe(id));
   if (!range) return;
   const SE3 world_from_reference = anchors_from_world_[index].inverse();
   std::vector<SweepView> others;
@@ -170,6 +171,15 @@ void PhotorealisticMapper::seed(size_t index, int cell, double min_color_error, 
     for (int i = 0; i < 3; ++i) g.rotation[i + 1] = static_cast<float>(rotation.vec()[i]);
   }
   model_.add(static_cast<int>(index), seeds, 0, static_cast<uint32_t>(iteration_));
+}
+
+void PhotorealisticMapper::add_gaussians(std::span<const splatting::Gaussian> in_world) {
+  PHOTOSLAM_CHECK(has_keyframes(), "gaussians need a keyframe to be anchored to");
+  const SE3& anchor_from_world = anchors_from_world_.front();
+  const ShRotation rotation(anchor_from_world.matrix3());
+  std::vector<splatting::Gaussian> in_anchor;
+  for (const splatting::Gaussian& g : in_world) in_anchor.push_back(transform(g, anchor_from_world, rotation));
+  model_.add(0, in_anchor, 0, static_cast<uint32_t>(iteration_));
 }
 
 splatting::TrainOptions PhotorealisticMapper::train_options(std::optional<double> progress) const {

@@ -77,6 +77,9 @@ class PhotorealisticMapper {
   /// Starts training on the next keyframe (by id) and seeds the part of its image that the map does not explain.
   void add_keyframe(const MapSnapshot& map, KeyframeId id, const KeyframeImages& images, Executor& executor);
 
+  /// Adds gaussians from elsewhere, given in the world frame, to the first keyframe; there must be one.
+  void add_gaussians(std::span<const splatting::Gaussian> in_world);
+
   /// One training iteration, Eq. (4). At least one keyframe is needed. `progress` in [0, 1] says how much of the
   /// refinement is done; empty while frames arrive.
   splatting::StepResult train(std::optional<double> progress, Executor& executor);

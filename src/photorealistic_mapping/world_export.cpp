@@ -37,26 +37,15 @@ Basis basis_at_directions(const Mat3& rotation) {
   return basis;
 }
 
-void write_row(const Gaussian& g, const SE3& world_from_anchor, const ShRotation& rotate_sh, std::span<float, 59> row) {
-  const Vec3 mean = world_from_anchor * Vec3(static_cast<double>(g.mean[0]), static_cast<double>(g.mean[1]),
-                                             static_cast<double>(g.mean[2]));
-  const Quat rotation =
-      world_from_anchor.rotation * Quat(static_cast<double>(g.rotation[0]), static_cast<double>(g.rotation[1]),
-                                        static_cast<double>(g.rotation[2]), static_cast<double>(g.rotation[3]));
-  float sh[splatting::kNumShCoefficients][3];
-  std::copy(&g.sh[0][0], &g.sh[0][0] + 48, &sh[0][0]);
-  rotate_sh.apply(sh);
-
-  for (size_t i = 0; i < 3; ++i) row[Table::kPosition + i] = static_cast<float>(mean[static_cast<int>(i)]);
+void write_row(const Gaussian& g, std::span<float, 59> row) {
+  for (size_t i = 0; i < 3; ++i) row[Table::kPosition + i] = g.mean[i];
   for (size_t c = 0; c < 3; ++c) {
-    row[Table::kShDc + c] = sh[0][c];
-    for (size_t k = 1; k < 16; ++k) row[Table::kShRest + 15 * c + k - 1] = sh[k][c];
+    row[Table::kShDc + c] = g.sh[0][c];
+    for (size_t k = 1; k < 16; ++k) row[Table::kShRest + 15 * c + k - 1] = g.sh[k][c];
   }
   row[Table::kOpacity] = g.opacity_logit;
   for (size_t i = 0; i < 3; ++i) row[Table::kScale + i] = g.log_scale[i];
-  row[Table::kRotation] = static_cast<float>(rotation.w());
-  for (size_t i = 0; i < 3; ++i)
-    row[Table::kRotation + 1 + i] = static_cast<float>(rotation.vec()[static_cast<int>(i)]);
+  for (size_t i = 0; i < 4; ++i) row[Table::kRotation + i] = g.rotation[i];
 }
 
 }  // namespace
@@ -83,6 +72,19 @@ void ShRotation::apply(float (&sh)[splatting::kNumShCoefficients][3]) const {
   }
 }
 
+Gaussian transform(const Gaussian& in_a, const SE3& b_from_a, const ShRotation& rotation) {
+  const auto wide = [](float value) { return static_cast<double>(value); };
+  const Vec3 mean = b_from_a * Vec3(wide(in_a.mean[0]), wide(in_a.mean[1]), wide(in_a.mean[2]));
+  const Quat turned = b_from_a.rotation * Quat(wide(in_a.rotation[0]), wide(in_a.rotation[1]), wide(in_a.rotation[2]),
+                                               wide(in_a.rotation[3]));
+  Gaussian in_b = in_a;
+  rotation.apply(in_b.sh);
+  for (int i = 0; i < 3; ++i) in_b.mean[i] = static_cast<float>(mean[i]);
+  in_b.rotation[0] = static_cast<float>(turned.w());
+  for (int i = 0; i < 3; ++i) in_b.rotation[i + 1] = static_cast<float>(turned.vec()[i]);
+  return in_b;
+}
+
 GaussianTable to_world(const splatting::GaussianModel& model, std::span<const SE3> anchors_from_world) {
   std::vector<SE3> world_from_anchors;
   std::vector<ShRotation> rotations;
@@ -98,7 +100,7 @@ GaussianTable to_world(const splatting::GaussianModel& model, std::span<const SE
     Gaussian g = model.get(index);
     std::fill(&g.sh[0][0] + 3 * used, &g.sh[0][0] + 48, 0.0f);
     const auto anchor = static_cast<size_t>(model.anchor(index));
-    write_row(g, world_from_anchors[anchor], rotations[anchor], table.row(row++));
+    write_row(transform(g, world_from_anchors[anchor], rotations[anchor]), table.row(row++));
   });
   return table;
 }

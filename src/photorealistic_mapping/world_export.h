@@ -10,13 +10,6 @@
 
 namespace photoslam {
 
-/// The gaussians in the world frame, as files hold them: means, rotations and spherical harmonics leave the frames of
-/// their anchors. Coefficients beyond the model's degree are zero. anchors_from_world: [anchors].
-GaussianTable to_world(const splatting::GaussianModel& model, std::span<const SE3> anchors_from_world);
-
-/// The gaussians of a file as a model with one anchor: the world.
-splatting::GaussianModel from_world(const GaussianTable& table);
-
 /// Rotates spherical-harmonic coefficients [16][3]: the colour seen along R d afterwards is that along d before.
 class ShRotation {
  public:
@@ -26,5 +19,15 @@ class ShRotation {
  private:
   Eigen::Matrix<double, 16, 16> matrix_;
 };
+
+/// The same gaussian in another frame; `rotation` is that of b_from_a.
+splatting::Gaussian transform(const splatting::Gaussian& in_a, const SE3& b_from_a, const ShRotation& rotation);
+
+/// The gaussians in the world frame, as files hold them: means, rotations and spherical harmonics leave the frames of
+/// their anchors. Coefficients beyond the model's degree are zero. anchors_from_world: [anchors].
+GaussianTable to_world(const splatting::GaussianModel& model, std::span<const SE3> anchors_from_world);
+
+/// The gaussians of a file as a model with one anchor: the world.
+splatting::GaussianModel from_world(const GaussianTable& table);
 
 }  // namespace photoslam

@@ -1,0 +1,262 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <memory>
+#include <thread>
+
+#include "base/clock.h"
+#include "base/file.h"
+#include "commands.h"
+#include "config_arguments.h"
+#include "evaluation/image_score.h"
+#include "evaluation/map_scoring.h"
+#include "image/convert.h"
+#include "interrupt.h"
+#include "io/gaussian_ply.h"
+#include "io/image_file.h"
+#include "photorealistic_mapping/photorealistic_mapper.h"
+#include "photorealistic_mapping/posed_map.h"
+#include "photorealistic_mapping/view_geometry.h"
+#include "photorealistic_mapping/world_export.h"
+#include "run_images.h"
+
+namespace photoslam {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct TrainArguments {
+  fs::path input;
+  fs::path run;
+  fs::path output = "output/train";
+  std::string init = "depth";
+  double seconds = 60;
+  int iterations = 0;
+  int hold_out = 0;
+  int threads = 0;
+  uint64_t seed = 1;
+  ConfigArguments config;
+};
+
+/// Pictures with one camera and their poses, and the points that came with them.
+struct PosedImages {
+  PinholeCamera camera;
+  std::vector<SE3> poses;       // camera_from_world
+  std::vector<ImageU8> images;  // RGB
+  std::vector<SparsePoint> points;
+
+  Status add(const PosedCamera& posed, const ImageU8& image) {
+    if (poses.empty()) camera = posed.camera;
+    if (posed.camera != camera) {
+      return error("{}: not the camera of the first image; all must share one", posed.image.string());
+    }
+    if (image.width() != camera.width || image.height() != camera.height) {
+      return error("{}: {}x{}, but its camera says {}x{}", posed.image.string(), image.width(), image.height(),
+                   camera.width, camera.height);
+    }
+    poses.push_back(posed.camera_from_world);
+    images.push_back(to_rgb(image));
+    return {};
+  }
+};
+
+/// Where a COLMAP dataset keeps its model.
+fs::path colmap_model(const fs::path& folder) {
+  for (const char* below : {"sparse/0", "sparse", "."}) {
+    if (fs::exists(folder / below / "images.txt")) return folder / below;
+  }
+  return {};
+}
+
+Result<PosedImages> read_files(const fs::path& input) {
+  PosedImages result;
+  Result<std::vector<PosedCamera>> cameras = std::vector<PosedCamera>{};
+  if (!fs::is_directory(input)) {
+    cameras = read_transforms_json(input);
+  } else if (fs::exists(input / "transforms.json")) {
+    cameras = read_transforms_json(input / "transforms.json");
+  } else if (const fs::path model = colmap_model(input); !model.empty()) {
+    cameras = read_colmap_cameras(model, input / "images");
+    auto points = read_colmap_points(model);
+    if (!points) return points.error();
+    result.points = std::move(*points);
+  } else {
+    return error("{}: found neither transforms.json nor a COLMAP model in text form (sparse/0/images.txt)",
+                 input.string());
+  }
+  if (!cameras) return cameras.error();
+  for (const PosedCamera& posed : *cameras) {
+    const auto image = read_image(posed.image);
+    if (!image) return image.error();
+    if (Status status = result.add(posed, *image); !status) return status.error();
+  }
+  return result;
+}
+
+Result<PosedImages> read_run(const fs::path& run) {
+  PosedImages result;
+  const auto add = [&](FrameId, const PosedCamera& posed, const ImageU8& image) { return result.add(posed, image); };
+  if (Status status = for_each_keyframe_image(run, add); !status) return status.error();
+  if (result.poses.empty()) return error("{}: no keyframes whose images can still be read", run.string());
+  return result;
+}
+
+/// Gaussians of random place and colour where the cameras look.
+std::vector<splatting::Gaussian> random_gaussians(const PosedImages& input, int count, uint64_t seed) {
+  const Vec3 focus = focus_point(input.poses);
+  double radius = 0;
+  for (const SE3& pose : input.poses) radius = std::max(radius, (pose * focus).norm());
+  Random random(seed);
+  std::vector<splatting::Gaussian> gaussians(static_cast<size_t>(count));
+  const double spacing = 2 * radius / std::cbrt(static_cast<double>(count));
+  for (splatting::Gaussian& g : gaussians) {
+    for (int i = 0; i < 3; ++i) {
+      g.mean[i] = static_cast<float>(focus[i] + random.uniform(-radius, radius));
+      g.log_scale[i] = static_cast<float>(std::log(0.5 * spacing));
+      g.sh[0][i] = static_cast<float>(random.uniform(-1.0, 1.0));
+    }
+    g.opacity_logit = -2.2f;
+  }
+  return gaussians;
+}
+
+/// The gaussians to begin with; nothing when they are seeded from measured depth.
+Result<std::vector<splatting::Gaussian>> initial_gaussians(const TrainArguments& arguments, const PosedImages& input) {
+  std::vector<splatting::Gaussian> gaussians;
+  if (arguments.init == "depth") return gaussians;
+  if (arguments.init.starts_with("random:")) {
+    const int count = std::atoi(arguments.init.c_str() + 7);
+    if (count < 1) return error("--init {}: expected random:COUNT", arguments.init);
+    return random_gaussians(input, count, arguments.seed);
+  }
+  const auto table = read_gaussian_ply(arguments.init);
+  if (!table) return table.error();
+  const splatting::GaussianModel model = from_world(*table);
+  model.for_each([&](size_t i) { gaussians.push_back(model.get(i)); });
+  return gaussians;
+}
+
+bool is_held_out(const TrainArguments& arguments, size_t i) {
+  return arguments.hold_out > 0 && static_cast<int>(i) % arguments.hold_out == arguments.hold_out - 1;
+}
+
+void train_until_done(const TrainArguments& arguments, std::stop_token stop, Executor& executor,
+                      PhotorealisticMapper& mapper) {
+  const Stopwatch clock;
+  double last_line = 0;
+  for (int i = 0; !stop.stop_requested(); ++i) {
+    const double done =
+        arguments.iterations > 0 ? static_cast<double>(i) / arguments.iterations : clock.seconds() / arguments.seconds;
+    if (done >= 1) return;
+    mapper.train(done, executor);
+    if (clock.seconds() - last_line < 2) continue;
+    last_line = clock.seconds();
+    fmt::print(stderr, "{:3.0f} %: {} iterations, {} gaussians, PSNR {:.1f} dB\n", 100 * done, mapper.num_iterations(),
+               mapper.gaussians().size(), mapper.training_psnr());
+  }
+}
+
+/// Renders every picture from the trained map; writes the pairs, render beside truth, and prints the figures.
+Status score(const TrainArguments& arguments, const PosedImages& input, const FrozenMap& map, Executor& executor) {
+  splatting::Renderer renderer;
+  splatting::RenderResult result;
+  std::vector<splatting::Pose> camera_from_anchor;
+  std::vector<FrameScore> trained, held_out;
+  const fs::path pairs = arguments.output / "pairs";
+  if (Status status = prepare_output_folder(pairs); !status) return status;
+  size_t next_keyframe = 0;
+  for (size_t i = 0; i < input.poses.size(); ++i) {
+    const bool held = is_held_out(arguments, i);
+    const SE3& pose = held ? input.poses[i] : map.keyframes_from_world[next_keyframe++];
+    camera_from_anchors(pose, map.anchors_from_world, camera_from_anchor);
+    renderer.render(map.gaussians, {to_splatting(input.camera), camera_from_anchor}, {}, executor, result);
+    const ImageF render = to_image(result);
+    (held ? held_out : trained).push_back(score_frame(FrameId(static_cast<int32_t>(i)), 0, render, input.images[i]));
+    ImageU8 pair(2 * input.camera.width, input.camera.height, 3);
+    const ImageU8 drawn = to_u8(render);
+    for (int y = 0; y < pair.height(); ++y) {
+      std::copy_n(drawn.row(y), 3 * drawn.width(), pair.row(y));
+      std::copy_n(input.images[i].row(y), 3 * drawn.width(), pair.row(y) + 3 * drawn.width());
+    }
+    if (Status status = write_png(pairs / fmt::format("{:06}.png", i), pair); !status) return status;
+  }
+  for (const auto& [name, scores] : {std::pair{"trained views", &trained}, {"held-out views", &held_out}}) {
+    if (scores->empty()) continue;
+    const ImageFigures figures = summarize(*scores);
+    fmt::print("  {:<18}PSNR {:.2f} dB (5 % below {:.2f}), SSIM {:.3f}, {} images\n", name, *figures.psnr_db,
+               *figures.psnr_p5_db, *figures.ssim, scores->size());
+  }
+  return {};
+}
+
+Status train(const TrainArguments& arguments) {
+  if (arguments.input.empty() == arguments.run.empty()) {
+    throw CLI::ValidationError("give either posed images or --poses RUN");
+  }
+  Result<SystemOptions> options = arguments.config.load();
+  if (!options) return options.error();
+  const auto input = arguments.run.empty() ? read_files(arguments.input) : read_run(arguments.run);
+  if (!input) return input.error();
+  const auto start = initial_gaussians(arguments, *input);
+  if (!start) return start.error();
+  if (Status status = prepare_output_folder(arguments.output); !status) return status;
+  if (!start->empty()) options->photorealistic_mapping.depth.enabled = false;
+
+  const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  ThreadPool executor(arguments.threads > 0 ? arguments.threads : cores);
+  std::vector<SE3> poses;
+  std::vector<Vec3> points;
+  for (size_t i = 0; i < input->poses.size(); ++i) {
+    if (!is_held_out(arguments, i)) poses.push_back(input->poses[i]);
+  }
+  for (const SparsePoint& point : input->points) points.push_back(point.position);
+  const auto map = posed_map(input->camera, poses, points);
+  fmt::print(stderr, "{} images {}x{}, {} of them to train on\n", input->images.size(), input->camera.width,
+             input->camera.height, poses.size());
+
+  const InterruptGuard interrupt;
+  PhotorealisticMapper mapper(options->photorealistic_mapping, {.camera = input->camera}, arguments.seed);
+  int32_t keyframe = 0;
+  for (size_t i = 0; i < input->images.size(); ++i) {
+    if (is_held_out(arguments, i)) continue;
+    mapper.add_keyframe(*map, KeyframeId(keyframe++), {input->images[i], {}, {}}, executor);
+  }
+  mapper.add_gaussians(*start);
+  train_until_done(arguments, interrupt.token(), executor, mapper);
+
+  const FrozenMap trained = mapper.freeze();
+  const auto written =
+      write_gaussian_ply(arguments.output / "map.ply", to_world(trained.gaussians, trained.anchors_from_world));
+  if (!written) return written.error();
+  fmt::print("  {:<18}{} gaussians after {} iterations: {}\n", "map", written->written, mapper.num_iterations(),
+             (arguments.output / "map.ply").string());
+  return score(arguments, *input, trained, executor);
+}
+
+}  // namespace
+
+void add_train(CommandLine& line) {
+  auto arguments = std::make_shared<TrainArguments>();
+  CLI::App& command = line.add("train", "Map photorealistically from images whose poses are known",
+                               "  photoslam train transforms.json --seconds 120 --output output/fox\n"
+                               "  photoslam train colmap_folder --hold-out 8\n"
+                               "  photoslam train --poses output/desk --init random:10000 --seconds 60\n");
+  TrainArguments& a = *arguments;
+  command.add_option("images", a.input, "transforms.json, or a folder with one or with a COLMAP model as text");
+  command.add_option("--poses", a.run, "Take images and poses of the keyframes of a run instead");
+  command.add_option("--output", a.output, "Folder for map.ply and the pairs")->capture_default_str();
+  command
+      .add_option("--init", a.init,
+                  "Gaussians to begin with: depth (measured by comparing the images), random:COUNT, or a map.ply")
+      ->capture_default_str();
+  command.add_option("--seconds", a.seconds, "Time to train [s]")->check(CLI::Range(0.1, 1e6))->capture_default_str();
+  command.add_option("--iterations", a.iterations, "Iterations to train instead")->check(CLI::Range(0, 100000000));
+  command.add_option("--hold-out", a.hold_out, "Keep every Nth image for scoring")->check(CLI::Range(0, 1000000));
+  command.add_option("--seed", a.seed, "Seed of everything random")->capture_default_str();
+  command.add_option("--threads", a.threads, "Threads; 0: one per core")->check(CLI::Range(0, 1024));
+  a.config.bind(command);
+  line.on_run(command, [arguments] { return train(*arguments); });
+}
+
+}  // namespace photoslam
