@@ -14,6 +14,7 @@
 #include "interrupt.h"
 #include "pipeline/frame_rectifier.h"
 #include "pipeline/system.h"
+#include "preview_writer.h"
 #include "progress_line.h"
 #include "result_table.h"
 #include "run_folder.h"
@@ -30,6 +31,7 @@ struct RunArguments {
   std::string sensor = "auto";
   SourceOptions source;
   fs::path output = "output/run";
+  fs::path preview;
   std::string pace = "realtime";
   int iterations_per_frame = -1;
   double map_until_s = -1;
@@ -47,6 +49,7 @@ Status configure(const RunArguments& arguments, SystemOptions& options, RunSetti
     options.pipeline.iterations_per_frame = arguments.iterations_per_frame;
     settings.logical_time = true;
   }
+  settings.preview = !arguments.preview.empty();
   if (arguments.map_until_s >= 0) settings.map_until_s = arguments.map_until_s;
   if (settings.deterministic || settings.logical_time || arguments.pace == "asap") settings.pace = Pace::asap;
   if (settings.deterministic && settings.refine_seconds > 0) {
@@ -126,7 +129,12 @@ Status run(const RunArguments& arguments) {
   RunOutcome outcome;
   {
     ProgressLine line;
-    outcome = run_slam(options, settings, **source, interrupt.token(), [&](const Progress& p) { line.show(p); });
+    PreviewWriter preview(arguments.preview);
+    outcome = run_slam(options, settings, **source, interrupt.token(), [&](const Progress& p) {
+      line.show(p);
+      preview.show(p);
+    });
+    if (!preview.failure().empty()) fmt::print(stderr, "  note: no preview: {}\n", preview.failure());
   }
   if (outcome.final.keyframes_from_world.empty()) {
     const std::string why = outcome.frames.empty() ? "no frame was read" : outcome.frames.back().reason;
@@ -170,6 +178,8 @@ void add_run(CommandLine& line) {
   command.add_option("--fps", a.source.frames_per_second, "Rate of the images of a folder [Hz]")
       ->check(CLI::Range(0.01, 10000.0));
   command.add_option("--output", a.output, "Folder for the results")->capture_default_str();
+  command.add_option("--preview", a.preview,
+                     "Picture rewritten every second: the newest keyframe beside its render, and the trajectory");
   command.add_option("--pace", a.pace, "Release frames at their timestamps, or as fast as they are tracked")
       ->check(CLI::IsMember({"realtime", "asap"}))
       ->capture_default_str();

@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <functional>
 
+#include "base/ids.h"
 #include "base/result.h"
+#include "image/image.h"
 #include "sources/posed_cameras.h"
 
 namespace photoslam {

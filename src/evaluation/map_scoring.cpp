@@ -46,16 +46,6 @@ struct Worker {
 
 }  // namespace
 
-ImageF to_image(const splatting::RenderResult& render) {
-  ImageF image(render.width, render.height, 3);
-  const size_t plane = render.alpha.size();
-  std::span<float> out = image.values();
-  for (size_t i = 0; i < plane; ++i) {
-    for (size_t c = 0; c < 3; ++c) out[3 * i + c] = std::clamp(render.rgb[c * plane + i], 0.0f, 1.0f);
-  }
-  return image;
-}
-
 std::vector<MapScores> score_maps(FrameSource& source, std::span<const ScoringTask> tasks,
                                   std::span<const FrameId> pair_frames, Executor& executor) {
   const FrameRectifier rectifier(source.info());

@@ -32,7 +32,4 @@ struct MapScores {
 std::vector<MapScores> score_maps(FrameSource& source, std::span<const ScoringTask> tasks,
                                   std::span<const FrameId> pair_frames, Executor& executor);
 
-/// The render as an image; planes become interleaved, values are clamped to [0, 1].
-ImageF to_image(const splatting::RenderResult& render);
-
 }  // namespace photoslam

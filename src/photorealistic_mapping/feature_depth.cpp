@@ -71,6 +71,7 @@ std::vector<DepthPixel> feature_depths(const FeatureDepthOptions& options, const
     LandmarkId id = keyframe.landmarks[i];
     if (const LandmarkView* landmark = map.find(id)) {
       pixel.depth = static_cast<float>((keyframe.camera_from_world * landmark->position).z());
+      pixel.active = true;
     } else if (!(pixel.depth > 0)) {
       pixel.depth = picture_depth(picture, factor, pixel);
     }

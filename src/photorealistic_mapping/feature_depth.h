@@ -22,6 +22,7 @@ struct FeatureDepthOptions {
 struct DepthPixel {
   float x = 0, y = 0;
   float depth = 0;
+  bool active = false;  ///< Geometry mapping tracks a landmark there.
 };
 
 /// Gives pixels without depth the mean inverse depth of their nearest neighbours that have one, weighted by distance

@@ -236,6 +236,14 @@ void PhotorealisticMapper::maintain(std::optional<double> progress, Executor& ex
   prune(options_.densification, scene_depth_, model_);
 }
 
+KeyframeComparison PhotorealisticMapper::compare_newest(Executor& executor) {
+  PHOTOSLAM_CHECK(has_keyframes(), "no keyframe yet");
+  const DepthPicture& picture = views_.back().picture;
+  camera_from_anchors(view_from_world(views_.size() - 1), anchors_from_world_, camera_from_anchor_);
+  renderer_.render(model_, {to_splatting(picture.camera), camera_from_anchor_}, render_options(), executor, render_);
+  return {to_rgb(picture.color), to_u8(to_image(render_))};
+}
+
 FrozenMap PhotorealisticMapper::freeze() const {
   FrozenMap frozen;
   frozen.anchors_from_world = anchors_from_world_;

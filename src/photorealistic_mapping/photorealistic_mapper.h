@@ -64,6 +64,12 @@ struct FrozenMap {
   std::vector<SE3> keyframes_from_world;  ///< [K] camera_from_world, photometrically adjusted: what trajectories use.
 };
 
+/// A picture and the render of the same view, both RGB.
+struct KeyframeComparison {
+  ImageU8 picture;
+  ImageU8 render;
+};
+
 /// Photorealistic mapping (paper, Sec. 3.3 and 3.4): trains the gaussians of the hyper primitives map on keyframe
 /// images by splatting, with geometry-based densification and Gaussian-pyramid learning. Synchronous; deterministic for
 /// a seed, at any concurrency of the executor.
@@ -83,6 +89,9 @@ class PhotorealisticMapper {
   /// One training iteration, Eq. (4). At least one keyframe is needed. `progress` in [0, 1] says how much of the
   /// refinement is done; empty while frames arrive.
   splatting::StepResult train(std::optional<double> progress, Executor& executor);
+
+  /// The newest keyframe's picture at half the size, and what the map shows there now.
+  KeyframeComparison compare_newest(Executor& executor);
 
   bool has_keyframes() const { return !views_.empty(); }
   const splatting::GaussianModel& gaussians() const { return model_; }

@@ -152,6 +152,10 @@ splatting::Gaussian make_disc(const SeedingOptions& options, const Vec3& mean, c
 }  // namespace
 
 void SeedingOptions::visit(OptionVisitor& v) {
+  v.value({"dense", "", 0, 0, "One gaussian per image cell where depth is known, beyond the paper."}, dense);
+  v.value(
+      {"inactive_features", "", 0, 0, "Geometry-based densification: gaussians at features without a landmark too."},
+      inactive_features);
   v.value({"cell_px", "px", 2, 64, "Side of the image cells that become one gaussian each, at full resolution."},
           cell_px);
   v.value({"sigma_cells", "cells", 0.1, 4.0, "Standard deviation of a new gaussian."}, sigma_cells);
@@ -174,6 +178,7 @@ void SeedingOptions::visit(OptionVisitor& v) {
 std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const DepthPicture& view,
                                             const splatting::RenderResult& render, int cell_size,
                                             double min_color_error) {
+  if (!options.dense) return {};
   CellGrid grid;
   grid.columns = (view.camera.width + cell_size - 1) / cell_size;
   grid.rows = (view.camera.height + cell_size - 1) / cell_size;
@@ -207,6 +212,7 @@ std::vector<splatting::Gaussian> seed_features(const SeedingOptions& options, co
   const size_t plane = static_cast<size_t>(view.camera.width) * static_cast<size_t>(view.camera.height);
   std::vector<splatting::Gaussian> seeds;
   for (const DepthPixel& feature : features) {
+    if (!feature.active && !options.inactive_features) continue;
     const Vec2 pixel((static_cast<double>(feature.x) + 0.5) / factor - 0.5,
                      (static_cast<double>(feature.y) + 0.5) / factor - 0.5);
     const int x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));

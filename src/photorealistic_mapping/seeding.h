@@ -14,6 +14,8 @@
 namespace photoslam {
 
 struct SeedingOptions {
+  bool dense = true;
+  bool inactive_features = true;
   int cell_px = 8;
   double sigma_cells = 0.7;
   double thickness = 0.2;

@@ -124,11 +124,22 @@ TEST(SeedCells, WithoutAnyDepthThereIsNothingToSeed) {
   EXPECT_TRUE(seed_cells({}, scene.view, scene.render, kCell, 0.1).empty());
 }
 
+TEST(SeedFeatures, BothDensificationsCanBeSwitchedOff) {
+  SeedingOptions options;
+  options.dense = false;
+  options.inactive_features = false;
+  Scene scene(2.0);
+  EXPECT_TRUE(seed_cells(options, scene.view, scene.render, kCell, options.min_color_error).empty());
+  const std::vector<DepthPixel> features = {{20.5f, 20.5f, 2.0f, true}, {80.5f, 60.5f, 2.0f, false}};
+  EXPECT_EQ(seed_features(options, scene.view, 2, scene.render, features).size(), 1u) << "landmarks stay";
+}
+
 TEST(SeedFeatures, OnlyPixelsThatLookWrongGetOne) {
   const SeedingOptions options;
   Scene scene(2.0);
   scene.render_exactly();
-  const std::vector<DepthPixel> features = {{20.5f, 20.5f, 2.0f}, {80.5f, 60.5f, 2.0f}, {500.0f, 2.0f, 2.0f}};
+  const std::vector<DepthPixel> features = {
+      {20.5f, 20.5f, 2.0f, true}, {80.5f, 60.5f, 2.0f, false}, {500.0f, 2.0f, 2.0f, true}};
   EXPECT_TRUE(seed_features(options, scene.view, 2, scene.render, features).empty());
   for (int c = 0; c < 3; ++c) scene.view.color(40, 30, c) = 255;  // where feature 1 lies in the half-size view
   const auto seeds = seed_features(options, scene.view, 2, scene.render, features);

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "photorealistic_mapping/view_geometry.h"
 
+#include <algorithm>
+
 namespace photoslam {
 
 splatting::Camera to_splatting(const PinholeCamera& camera) {
@@ -11,6 +13,16 @@ splatting::Camera to_splatting(const PinholeCamera& camera) {
           static_cast<float>(camera.fy),
           static_cast<float>(camera.cx),
           static_cast<float>(camera.cy)};
+}
+
+ImageF to_image(const splatting::RenderResult& render) {
+  ImageF image(render.width, render.height, 3);
+  const size_t plane = render.alpha.size();
+  const std::span<float> out = image.values();
+  for (size_t i = 0; i < plane; ++i) {
+    for (size_t c = 0; c < 3; ++c) out[3 * i + c] = std::clamp(render.rgb[c * plane + i], 0.0f, 1.0f);
+  }
+  return image;
 }
 
 void camera_from_anchors(const SE3& camera_from_world, std::span<const SE3> anchors_from_world,

@@ -6,13 +6,18 @@
 #include <vector>
 
 #include "camera/pinhole.h"
+#include "image/image.h"
 #include "math/se3.h"
+#include "splatting/renderer.h"
 #include "splatting/view.h"
 
 namespace photoslam {
 
 /// The camera as the splatting engine takes it.
 splatting::Camera to_splatting(const PinholeCamera& camera);
+
+/// The render as an image; planes become interleaved, values are clamped to [0, 1].
+ImageF to_image(const splatting::RenderResult& render);
 
 /// Where a camera is, seen from every anchor keyframe: composed in double precision, so that nothing is lost far from
 /// the origin. Writes [anchors] poses.

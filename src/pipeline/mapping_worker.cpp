@@ -8,7 +8,9 @@ namespace photoslam {
 
 MappingWorker::MappingWorker(const SystemOptions& options, const RunSettings& settings, MapperSensor sensor,
                              Executor& executor)
-    : mapper_(options.photorealistic_mapping, std::move(sensor), settings.seed), executor_(executor) {}
+    : mapper_(options.photorealistic_mapping, std::move(sensor), settings.seed),
+      executor_(executor),
+      preview_(settings.preview) {}
 
 void MappingWorker::freeze_if_due() {
   if (online_ || std::chrono::steady_clock::now().time_since_epoch().count() < freeze_time_) return;
@@ -37,9 +39,30 @@ void MappingWorker::train(int count) {
     mapper_.train({}, executor_);
     ++iterations;
   }
+  update_figures();
+  cpu_seconds = thread_cpu_seconds();
+}
+
+void MappingWorker::refine(double progress) {
+  mapper_.train(progress, executor_);
+  ++iterations;
+  update_figures();
+}
+
+void MappingWorker::update_figures() {
+  constexpr double kComparisonSeconds = 1.0;
   gaussians = mapper_.gaussians().size();
   training_psnr = mapper_.training_psnr();
-  cpu_seconds = thread_cpu_seconds();
+  if (!preview_ || !mapper_.has_keyframes() || since_comparison_.seconds() < kComparisonSeconds) return;
+  since_comparison_.restart();
+  auto comparison = std::make_shared<const KeyframeComparison>(mapper_.compare_newest(executor_));
+  std::lock_guard lock(mutex_);
+  comparison_ = std::move(comparison);
+}
+
+std::shared_ptr<const KeyframeComparison> MappingWorker::comparison() const {
+  std::lock_guard lock(mutex_);
+  return comparison_;
 }
 
 FrozenMap MappingWorker::take_online() {

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <memory>
 
+#include "base/clock.h"
 #include "base/executor.h"
 #include "pipeline/frame_feed.h"
 #include "pipeline/system_options.h"
@@ -38,6 +39,12 @@ class MappingWorker {
   /// The online map; frozen now if it has not been before. Call after the stage has finished.
   FrozenMap take_online();
 
+  /// The last picture of the newest keyframe beside its render, about a second old at most while training; null without
+  /// RunSettings::preview. From any thread.
+  std::shared_ptr<const KeyframeComparison> comparison() const;
+  /// Trains once more after the input has ended; `progress` as in PhotorealisticMapper::train().
+  void refine(double progress);
+
   PhotorealisticMapper& mapper() { return mapper_; }
   Executor& executor() { return executor_; }
 
@@ -50,11 +57,16 @@ class MappingWorker {
  private:
   void train(int count);
   void freeze_if_due();
+  void update_figures();
 
   PhotorealisticMapper mapper_;
   Executor& executor_;
   std::atomic<SteadyTime::rep> freeze_time_{std::numeric_limits<SteadyTime::rep>::max()};
   std::optional<FrozenMap> online_;
+  bool preview_;
+  Stopwatch since_comparison_;
+  mutable std::mutex mutex_;
+  std::shared_ptr<const KeyframeComparison> comparison_;
 };
 
 }  // namespace photoslam

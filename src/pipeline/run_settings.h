@@ -30,6 +30,7 @@ struct RunSettings {
   int refine_iterations = 0;  ///< … or so many iterations.
   int hold_out = 0;           ///< Every so many-th frame is tracked but never mapped; 0: none.
   double map_until_s = std::numeric_limits<double>::infinity();  ///< Later frames are tracked only.
+  bool preview = false;       ///< Progress carries pictures of what is being mapped, about once a second.
   bool logical_time = false;  ///< Tracking waits for the mapper; set by deterministic, or to spend a fixed number of
                               ///< iterations per frame.
 };

@@ -213,6 +213,12 @@ Progress Session::progress(Progress::Phase phase) const {
   p.gaussians = mapping_.gaussians;
   p.iterations = mapping_.iterations;
   p.training_psnr_db = mapping_.training_psnr;
+  if (settings_.preview) {
+    p.comparison = mapping_.comparison();
+    for (const FrameOutcome& frame : outcomes_) {
+      if (frame.has_pose) p.positions.push_back(frame.online_camera_from_world.inverse().translation);
+    }
+  }
   return p;
 }
 
@@ -225,10 +231,7 @@ void Session::refine(const std::function<void(const Progress&)>& on_progress) {
     const double done = settings_.refine_iterations > 0 ? static_cast<double>(i) / settings_.refine_iterations
                                                         : elapsed / std::max(settings_.refine_seconds, 1e-9);
     if (done >= 1.0 || (settings_.refine_iterations == 0 && settings_.refine_seconds <= 0)) break;
-    mapping_.mapper().train(done, mapping_.executor());
-    ++mapping_.iterations;
-    mapping_.gaussians = mapping_.mapper().gaussians().size();
-    mapping_.training_psnr = mapping_.mapper().training_psnr();
+    mapping_.refine(done);
     if (elapsed - last_report < 1e-3 * static_cast<double>(kProgressInterval.count())) continue;
     last_report = elapsed;
     outcome_.refinement.push_back({elapsed, mapping_.iterations, mapping_.training_psnr, mapping_.gaussians});
