@@ -22,28 +22,6 @@ struct ExportArguments {
   fs::path output;
 };
 
-constexpr size_t kSparsePoints = 20000;  // of the gaussians, as a start for other trainers
-
-/// The most solid gaussians as points.
-std::vector<SparsePoint> sparse_points(const GaussianTable& map) {
-  constexpr float kSh0 = 0.28209479177387814f;
-  std::vector<std::pair<float, size_t>> order;
-  for (size_t i = 0; i < map.size(); ++i) order.emplace_back(-map.row(i)[GaussianTable::kOpacity], i);
-  std::ranges::sort(order);
-  order.resize(std::min(order.size(), kSparsePoints));
-  std::vector<SparsePoint> points;
-  for (const auto& entry : order) {
-    const auto row = map.row(entry.second);
-    SparsePoint& point = points.emplace_back();
-    for (int k = 0; k < 3; ++k) point.position[k] = static_cast<double>(row[static_cast<size_t>(k)]);
-    for (size_t c = 0; c < 3; ++c) {
-      const float value = 255 * (0.5f + kSh0 * row[GaussianTable::kShDc + c]);
-      point.color[c] = static_cast<uint8_t>(std::clamp(value, 0.0f, 255.0f));
-    }
-  }
-  return points;
-}
-
 /// Writes the rectified pictures of the run's keyframes into `images` and says where they were taken.
 Result<std::vector<PosedCamera>> write_keyframe_images(const fs::path& run, const fs::path& images) {
   if (Status status = prepare_output_folder(images); !status) return status.error();

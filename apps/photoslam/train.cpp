@@ -98,6 +98,9 @@ Result<PosedImages> read_run(const fs::path& run) {
   PosedImages result;
   const auto add = [&](FrameId, const PosedCamera& posed, const ImageU8& image) { return result.add(posed, image); };
   if (Status status = for_each_keyframe_image(run, add); !status) return status.error();
+  const auto map = read_gaussian_ply(run / "map.ply");
+  if (!map) return map.error();
+  result.points = sparse_points(*map);
   if (result.poses.empty()) return error("{}: no keyframes whose images can still be read", run.string());
   return result;
 }
@@ -247,8 +250,10 @@ void add_train(CommandLine& line) {
   command.add_option("--poses", a.run, "Take images and poses of the keyframes of a run instead");
   command.add_option("--output", a.output, "Folder for map.ply and the pairs")->capture_default_str();
   command
-      .add_option("--init", a.init,
-                  "Gaussians to begin with: depth (measured by comparing the images), random:COUNT, or a map.ply")
+      .add_option(
+          "--init", a.init,
+          "Gaussians to begin with: depth (measured by comparing the images, in the range of the points that come "
+          "with them), random:COUNT, or a map.ply")
       ->capture_default_str();
   command.add_option("--seconds", a.seconds, "Time to train [s]")->check(CLI::Range(0.1, 1e6))->capture_default_str();
   command.add_option("--iterations", a.iterations, "Iterations to train instead")->check(CLI::Range(0, 100000000));
