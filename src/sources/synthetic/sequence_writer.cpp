@@ -99,6 +99,11 @@ Status check_sequence_folder(const fs::path& folder) {
   if (fs::exists(folder, code) && (!fs::is_directory(folder, code) || !fs::is_empty(folder, code))) {
     return error("{} exists and is not an empty folder; remove it or choose another one", folder.string());
   }
+  fs::path parent = fs::absolute(folder).lexically_normal();
+  while (parent.has_relative_path() && !fs::exists(parent, code)) parent = parent.parent_path();
+  if (!fs::is_directory(parent, code) || ::access(parent.c_str(), W_OK) != 0) {
+    return error("cannot write to {}: {} is not a folder that can be written", folder.string(), parent.string());
+  }
   return {};
 }
 

@@ -30,7 +30,8 @@ struct SequenceSettings {
 /// lens distortion with tum and euroc.
 Status check_layout(SequenceLayout layout, const SyntheticOptions& options);
 
-/// Whether a sequence may be written there: the folder must not exist or be empty.
+/// Whether a sequence may be written there: the folder must not exist or be empty, and what is above it must be
+/// writable.
 Status check_sequence_folder(const std::filesystem::path& folder);
 
 struct SequenceSummary {

@@ -180,6 +180,8 @@ TEST_F(SequenceWriterTest, LeavesNothingBehindWhenItCannotFinish) {
       stop.get_token());
   EXPECT_FALSE(stopped.ok());
   EXPECT_FALSE(write_sequence(camera, {}, used / "note.txt" / "below", pool).ok());
+  EXPECT_FALSE(check_sequence_folder(used / "note.txt" / "below" / "more").ok());
+  EXPECT_TRUE(check_sequence_folder(folder / "new" / "one").ok());
 
   // Only what was there before.
   EXPECT_TRUE(fs::exists(used / "note.txt"));
