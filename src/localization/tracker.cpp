@@ -77,7 +77,7 @@ Tracker::Tracker(const TrackerOptions& options, const OrbOptions& orb, const Pin
       initializer_(options.initialization, camera),
       keyframe_decision_(options.keyframes) {}
 
-TrackingResult Tracker::track(std::shared_ptr<const FeatureFrame> frame, std::shared_ptr<const MapSnapshot> map,
+TrackingResult Tracker::track(const std::shared_ptr<const FeatureFrame>& frame, std::shared_ptr<const MapSnapshot> map,
                               bool may_become_keyframe) {
   map_ = std::move(map);
   if (map_) {

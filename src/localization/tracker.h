@@ -60,7 +60,7 @@ class Tracker {
   Tracker(const TrackerOptions& options, const OrbOptions& orb, const PinholeCamera& camera, double bf);
 
   /// `may_become_keyframe` is false for frames that are tracked only (held out, or localisation without mapping).
-  TrackingResult track(std::shared_ptr<const FeatureFrame> frame, std::shared_ptr<const MapSnapshot> map,
+  TrackingResult track(const std::shared_ptr<const FeatureFrame>& frame, std::shared_ptr<const MapSnapshot> map,
                        bool may_become_keyframe);
 
   /// The frame whose images are needed should the next ones initialise a map; invalid when there is none.
