@@ -13,6 +13,7 @@
 #include "evaluation/run_evaluation.h"
 #include "interrupt.h"
 #include "pipeline/frame_rectifier.h"
+#include "pipeline/session_file.h"
 #include "pipeline/system.h"
 #include "preview_writer.h"
 #include "progress_line.h"
@@ -35,6 +36,8 @@ struct RunArguments {
   std::string pace = "realtime";
   int iterations_per_frame = -1;
   double map_until_s = -1;
+  fs::path load_map;
+  bool no_session = false;
   RunSettings settings;
   ConfigArguments config;
   bool json = false;
@@ -55,6 +58,18 @@ Status configure(const RunArguments& arguments, SystemOptions& options, RunSetti
   if (settings.deterministic && settings.refine_seconds > 0) {
     return error("--refine-seconds depends on the clock; with --deterministic use --refine-iterations");
   }
+  if (!arguments.no_session) settings.session_file = arguments.output / "session.photoslam";
+  return {};
+}
+
+Status load_session(const fs::path& path, const SourceInfo& info, RunSettings& settings) {
+  if (path.empty()) return {};
+  auto session = read_session(path);
+  if (!session) return session.error();
+  if (Status fits = check_session_camera(session_header(*session), FrameRectifier(info).camera()); !fits) {
+    return error("{}: {}", path.string(), fits.error().message);
+  }
+  settings.loaded_session = std::make_shared<const std::string>(std::move(*session));
   return {};
 }
 
@@ -122,6 +137,7 @@ Status run(const RunArguments& arguments) {
   auto source = open_source(arguments.dataset, arguments.source);
   if (!source) return source.error();
   const SourceInfo info = (*source)->info();
+  if (Status status = load_session(arguments.load_map, info, settings); !status) return status;
   if (Status status = prepare_output_folder(arguments.output); !status) return status;
   announce(info, arguments);
 
@@ -198,6 +214,14 @@ void add_run(CommandLine& line) {
       .add_option("--iterations-per-frame", a.iterations_per_frame,
                   "Let tracking wait for so many training iterations per frame: best quality offline")
       ->check(CLI::Range(0, 1000));
+  CLI::Option* load_map =
+      command.add_option("--load-map", a.load_map, "Session to continue: session.photoslam or the folder of its run");
+  command.add_flag("--localize-only", a.settings.localize_only, "Track in the loaded map and leave the map as it is")
+      ->needs(load_map);
+  command.add_flag("--no-session", a.no_session, "Write no session.photoslam: the map cannot be continued");
+  command
+      .add_option("--autosave", a.settings.autosave_s, "Save the session this often in between [s]; 0: only at the end")
+      ->check(CLI::Range(0.0, 1e6));
   command.add_option("--threads", a.settings.threads, "Threads for mapping; 0: one per core")
       ->check(CLI::Range(0, 1024));
   a.config.bind(command);

@@ -29,13 +29,16 @@ Status write_all(int descriptor, std::span<const std::byte> content, const std::
 
 }  // namespace
 
-Status write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> content) {
+Status write_file_atomically(const std::filesystem::path& path, std::initializer_list<std::string_view> pieces) {
   std::filesystem::path temporary = path;
   temporary += fmt::format(".{}.tmp", ::getpid());
   const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (descriptor < 0) return system_error("create", temporary);
 
-  Status status = write_all(descriptor, content, temporary);
+  Status status;
+  for (const std::string_view piece : pieces) {
+    if (status) status = write_all(descriptor, std::as_bytes(std::span(piece)), temporary);
+  }
   if (status && ::fsync(descriptor) != 0) status = system_error("flush", temporary);
   if (::close(descriptor) != 0 && status) status = system_error("close", temporary);
   if (status && ::rename(temporary.c_str(), path.c_str()) != 0) status = system_error("replace", path);
@@ -44,7 +47,11 @@ Status write_file_atomically(const std::filesystem::path& path, std::span<const 
 }
 
 Status write_file_atomically(const std::filesystem::path& path, std::string_view content) {
-  return write_file_atomically(path, std::as_bytes(std::span(content)));
+  return write_file_atomically(path, {content});
+}
+
+Status write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> content) {
+  return write_file_atomically(path, {std::string_view(reinterpret_cast<const char*>(content.data()), content.size())});
 }
 
 Result<std::string> read_file(const std::filesystem::path& path) {

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <initializer_list>
 #include <span>
 #include <string>
 #include <string_view>
@@ -16,6 +17,8 @@ namespace photoslam {
 /// Writes the whole content or leaves what was there before: temporary file beside it, fsync, rename.
 Status write_file_atomically(const std::filesystem::path& path, std::string_view content);
 Status write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> content);
+/// The same for content in pieces, one after the other.
+Status write_file_atomically(const std::filesystem::path& path, std::initializer_list<std::string_view> pieces);
 
 /// Reads a whole file; the error names the path and the reason.
 Result<std::string> read_file(const std::filesystem::path& path);

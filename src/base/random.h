@@ -30,6 +30,12 @@ class Random {
     return radius * std::cos(2.0 * std::numbers::pi * uniform());
   }
 
+  /// Writes or reads the state.
+  template <class Archive>
+  void serialize(Archive& archive) {
+    archive(state_);
+  }
+
  private:
   uint64_t state_;
 };

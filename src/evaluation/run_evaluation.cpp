@@ -66,6 +66,8 @@ void add_mapping_figures(const RunOutcome& run, Report& report) {
   report.mapping.seconds_drain = run.seconds_drain;
   report.mapping.seconds_refine = run.seconds_refine;
   report.seconds_total = run.seconds_total;
+  report.loops.closed = run.loops_closed;
+  report.loops.reconnected = run.loops_reconnected;
   if (run.iterations > 0) {
     report.mapping.ms_per_iteration =
         1e3 * (run.seconds_online + run.seconds_drain + run.seconds_refine) / run.iterations;

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <set>
 
+#include "base/archive.h"
 #include "geometry/triangulation.h"
 #include "geometry_mapping/epipolar_matching.h"
 
@@ -68,6 +69,11 @@ std::shared_ptr<const MapSnapshot> GeometryMapper::correct(const MapCorrection& 
   }
   for (const KeyframeId keyframe : correction.loop_keyframes) fuse_into(keyframe, correction.loop_landmarks);
   return map_.snapshot();
+}
+
+void GeometryMapper::serialize(Archive& archive) {
+  map_.serialize(archive, camera_.width, camera_.height);
+  archive(recent_landmarks_);
 }
 
 /// The landmark, or the one that replaced it; invalid when it is dead.

@@ -44,6 +44,8 @@ class GeometryMapper {
   GeometryMapper(const GeometryMapperOptions& options, const OrbOptions& orb, const PinholeCamera& camera, double bf);
   /// Continues with a map made before.
   void set_map(Map map) { map_ = std::move(map); }
+  /// Writes map and state, or replaces them by those read.
+  void serialize(Archive& archive);
 
   /// Adds the keyframe, culls and creates landmarks, fuses duplicates, adjusts, publishes. `interrupted` (asked between
   /// iterations) ends the adjustment early.

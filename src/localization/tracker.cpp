@@ -77,6 +77,13 @@ Tracker::Tracker(const TrackerOptions& options, const OrbOptions& orb, const Pin
       initializer_(options.initialization, camera),
       keyframe_decision_(options.keyframes) {}
 
+void Tracker::resume(int num_keyframes, int num_maps) {
+  num_proposed_ = num_keyframes;
+  num_maps_ = num_maps;
+  reference_ = KeyframeId(num_keyframes - 1);
+  lost_frames_ = 1;
+}
+
 TrackingResult Tracker::track(const std::shared_ptr<const FeatureFrame>& frame, std::shared_ptr<const MapSnapshot> map,
                               bool may_become_keyframe) {
   map_ = std::move(map);
@@ -86,6 +93,12 @@ TrackingResult Tracker::track(const std::shared_ptr<const FeatureFrame>& frame, 
   }
   if (num_proposed_ == 0) {
     return may_become_keyframe ? start_map(frame) : lost(*frame, "waiting for the first keyframe");
+  }
+
+  if (!last_) {  // Resumed: the search for a place in the old map begins now.
+    auto nothing = std::make_shared<FeatureFrame>();
+    nothing->timestamp_ns = frame->timestamp_ns;
+    last_ = nothing;
   }
 
   SE3 camera_from_world;

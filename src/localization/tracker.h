@@ -59,6 +59,9 @@ class Tracker {
   /// bf = fx * baseline [px m]; 0 for a single camera, whose unit of length is then arbitrary.
   Tracker(const TrackerOptions& options, const OrbOptions& orb, const PinholeCamera& camera, double bf);
 
+  /// Begins lost in a map of so many keyframes, in so many separate parts, that was made before.
+  void resume(int num_keyframes, int num_maps);
+
   /// `may_become_keyframe` is false for frames that are tracked only (held out, or localisation without mapping).
   TrackingResult track(const std::shared_ptr<const FeatureFrame>& frame, std::shared_ptr<const MapSnapshot> map,
                        bool may_become_keyframe);

@@ -3,6 +3,7 @@
 #include "loop_closure/essential_graph.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "math/median.h"
 
@@ -30,6 +31,27 @@ PoseGraph essential_graph(const MapSnapshot& map, int min_shared) {
   return graph;
 }
 
+KeyframeId root_of(const MapSnapshot& map, KeyframeId id) {
+  while (map.keyframe(id).keyframe.parent.valid()) id = map.keyframe(id).keyframe.parent;
+  return id;
+}
+
+/// Moves the younger of two maps so that the loop is met. Returns its root and the keyframe that it now hangs on.
+std::pair<KeyframeId, KeyframeId> join_maps(const MapSnapshot& map, const Loop& loop, PoseGraph& graph) {
+  const KeyframeId then_root = root_of(map, loop.then), now_root = root_of(map, loop.now);
+  const bool now_moves = then_root < now_root;
+  const KeyframeId moving_root = now_moves ? now_root : then_root;
+  const auto pose = [&](KeyframeId id) -> Sim3& { return graph.pose_from_world[static_cast<size_t>(id.value)]; };
+  const Sim3 old_from_new_world = now_moves ? pose(loop.now).inverse() * loop.now_from_then * pose(loop.then)
+                                            : pose(loop.then).inverse() * loop.now_from_then.inverse() * pose(loop.now);
+  for (const auto& view : map.keyframes) {
+    const KeyframeId id = view->keyframe.id;
+    if (root_of(map, id) == moving_root) pose(id) = pose(id) * old_from_new_world;
+  }
+  graph.pose_is_fixed[static_cast<size_t>(moving_root.value)] = 0;
+  return {moving_root, now_moves ? loop.then : loop.now};
+}
+
 double typical_depth(const MapSnapshot& map) {
   std::vector<double> depths;
   for (const auto& view : map.keyframes) {
@@ -44,12 +66,15 @@ MapCorrection close_loop(const PoseGraphOptions& options, int min_shared, bool w
                          const Loop& loop) {
   PoseGraph graph = essential_graph(map, min_shared);
   const std::vector<Sim3> before = graph.pose_from_world;
+  MapCorrection correction;
+  if (root_of(map, loop.then) != root_of(map, loop.now)) {
+    correction.new_parents.push_back(join_maps(map, loop, graph));
+  }
   // One exact observation against long chains of others: the loop is to be met, not to be averaged away.
   constexpr double kLoopWeight = 100;
   graph.edges.push_back({loop.then.value, loop.now.value, loop.now_from_then, kLoopWeight});
   optimize_pose_graph(options, with_scale, typical_depth(map), graph);
 
-  MapCorrection correction;
   for (size_t i = 0; i < before.size(); ++i) {
     correction.new_world_from_old_world.push_back(graph.pose_from_world[i].inverse() * before[i]);
   }

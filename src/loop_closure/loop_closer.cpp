@@ -44,6 +44,11 @@ std::optional<MapCorrection> LoopCloser::process(const MapSnapshot& map, const s
   return std::nullopt;
 }
 
+void LoopCloser::resume(const MapSnapshot& map) {
+  for (; map.has(next_); ++next_.value) detector_.add(map, next_);
+  num_issued_ = map.num_corrections;
+}
+
 /// The covisible keyframes of one that stays around are the last few; a gap in them means that the camera left and came
 /// back.
 void LoopCloser::count_reconnection(const MapSnapshot& map, KeyframeId id) {

@@ -34,6 +34,9 @@ class LoopCloser {
   /// Nothing comes either while an earlier correction is not in the map yet.
   std::optional<MapCorrection> process(const MapSnapshot& map, const std::function<bool()>& interrupted = {});
 
+  /// Begins with a map made before, whose keyframes have all been looked at.
+  void resume(const MapSnapshot& map);
+
   int num_closed() const { return num_closed_; }
   /// Times that tracking itself found back to an old part of the map.
   int num_reconnected() const { return num_reconnected_; }

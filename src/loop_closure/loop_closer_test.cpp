@@ -93,5 +93,41 @@ TEST_P(LoopCloserSeeds, RepeatedDoorsAreNoLoop) {
   }
 }
 
+/// Cuts a map in two: what keyframes from `first` on see becomes a map of its own, somewhere else in the world.
+Map cut(Map map, KeyframeId first, const Sim3& elsewhere) {
+  std::vector<Sim3> moves(map.num_keyframes());
+  for (size_t k = 0; k < map.num_keyframes(); ++k) {
+    const KeyframeId id(static_cast<int32_t>(k));
+    if (id < first) continue;
+    moves[k] = elsewhere;
+    const std::vector<LandmarkId> seen = map.keyframe(id).landmarks;
+    for (const LandmarkId landmark : seen) {
+      if (landmark.valid() && map.landmark(landmark).observations.front().keyframe < first) {
+        map.remove_observation(landmark, id);
+      }
+    }
+  }
+  map.set_parent(first, KeyframeId{});
+  map.apply({.new_world_from_old_world = moves});
+  return map;
+}
+
+TEST(LoopCloser, JoinsTwoMapsThatMeet) {
+  for (const bool with_depth : {true, false}) {
+    CorridorWorld corridor = CorridorWorld::square(10, 3);
+    Map drifted = corridor.drifted_map(0.002, 0.0005, 0, with_depth, 3);
+    const Sim3 elsewhere(with_depth ? 1.0 : 1.6, so3_exp(Vec3(0.5, 2, -1)), Vec3(-1000, 20, 3));
+    Closing closing(corridor, with_depth, 0, 3);
+    closing.geometry.set_map(cut(std::move(drifted), KeyframeId(100), elsewhere));
+    const double before = closing.gap();
+    closing.run();
+    EXPECT_GE(closing.closer.num_closed(), 1);
+    EXPECT_GT(before, 900);
+    EXPECT_LT(closing.gap(), 0.3);
+    EXPECT_TRUE(closing.geometry.map().keyframe(KeyframeId(100)).parent.valid());
+    EXPECT_FALSE(closing.geometry.map().keyframe(KeyframeId(0)).parent.valid());
+  }
+}
+
 }  // namespace
 }  // namespace photoslam

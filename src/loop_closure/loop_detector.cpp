@@ -116,6 +116,10 @@ std::optional<Loop> LoopDetector::detect(const MapSnapshot& map, KeyframeId now)
   return std::nullopt;
 }
 
+void LoopDetector::add(const MapSnapshot& map, KeyframeId id) {
+  index_.add(id.value, strongest_descriptors(map.keyframe(id).keyframe.frame->features));
+}
+
 std::vector<PlaceCandidate> LoopDetector::similar_places(const MapSnapshot& map, const Keyframe& now) {
   const std::vector<Descriptor> descriptors = strongest_descriptors(now.frame->features);
   const std::set<KeyframeId> known = connected(map, now.id);

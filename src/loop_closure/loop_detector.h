@@ -49,6 +49,8 @@ class LoopDetector {
 
   /// The loop that a keyframe closes, if there is one. Call once per keyframe, in order; adds it to the index.
   std::optional<Loop> detect(const MapSnapshot& map, KeyframeId now);
+  /// Only adds a keyframe to the index.
+  void add(const MapSnapshot& map, KeyframeId id);
 
  private:
   std::vector<PlaceCandidate> similar_places(const MapSnapshot& map, const Keyframe& now);

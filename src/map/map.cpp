@@ -167,6 +167,7 @@ void Map::apply(const MapCorrection& correction) {
     set_position(id, position);
     update_view(id);
   }
+  for (const auto& [child, parent] : correction.new_parents) set_parent(child, parent);
   ++num_corrections_;
 }
 

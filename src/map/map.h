@@ -13,6 +13,8 @@
 
 namespace photoslam {
 
+class Archive;
+
 /// The geometric half of the hyper primitives map: keyframes, landmarks and who sees what.
 ///
 /// Invariant: keyframe k lists landmark l at keypoint i exactly when l's observations contain (k, i), and dead
@@ -51,6 +53,9 @@ class Map {
 
   /// Keyframes sharing at least `min_shared` landmarks with this one, strongest first, ties by id.
   std::vector<CovisibleKeyframe> covisible_keyframes(KeyframeId id, int min_shared) const;
+
+  /// Writes the map, or replaces this one by the map read; `image_width` and `image_height` are those of its camera.
+  void serialize(Archive& archive, int image_width, int image_height);
 
   /// Publishes the present state; unchanged parts are shared with the previous snapshot.
   std::shared_ptr<const MapSnapshot> snapshot();

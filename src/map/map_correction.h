@@ -19,6 +19,8 @@ struct MapCorrection {
   /// Moves in addition to that of the oldest observer [m, new world].
   std::map<LandmarkId, Vec3> landmark_shifts = {};
 
+  /// Spanning tree: the first, until now the root of a map of its own, becomes a child of the second.
+  std::vector<std::pair<KeyframeId, KeyframeId>> new_parents = {};
   /// Landmarks that are the same point: the first is to become the second.
   std::vector<std::pair<LandmarkId, LandmarkId>> duplicates = {};
   /// Where more duplicates are to be sought: these landmarks in these keyframes.

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/archive.h"
 #include "map/testing/point_world.h"
 
 namespace photoslam {
@@ -191,6 +192,34 @@ TEST_F(CorrectedMap, LandmarksFollowTheirOldestObserverAndShift) {
   const Sim3 move0(SE3(Quat::Identity(), Vec3(0, 0, 1))), move1(SE3(Quat::Identity(), Vec3(5, 0, 0)));
   map.apply({.new_world_from_old_world = {move0, move1}, .landmark_shifts = {{id, Vec3(0, 0.25, 0)}}});
   EXPECT_LT((map.landmark(id).view.position - before - Vec3(0, 0.25, 1)).norm(), 1e-12);
+}
+
+TEST_F(CorrectedMap, AnArchiveHoldsAllOfIt) {
+  map.fuse(map.keyframe(KeyframeId(0)).landmarks[1], map.keyframe(KeyframeId(0)).landmarks[0]);
+  Archive saved;
+  map.serialize(saved, world.camera.width, world.camera.height);
+  Map loaded(2.0, 1);
+  Archive reader(saved.bytes());
+  loaded.serialize(reader, world.camera.width, world.camera.height);
+  EXPECT_TRUE(reader.at_end());
+  Archive saved_again;
+  loaded.serialize(saved_again, world.camera.width, world.camera.height);
+  EXPECT_EQ(saved_again.bytes(), saved.bytes());
+
+  expect_consistent(loaded);
+  const auto a = map.snapshot(), b = loaded.snapshot();
+  ASSERT_EQ(a->keyframes.size(), b->keyframes.size());
+  ASSERT_EQ(a->num_landmarks, b->num_landmarks);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_EQ(a->keyframe(KeyframeId(k)).median_depth, b->keyframe(KeyframeId(k)).median_depth);
+    EXPECT_EQ(a->keyframe(KeyframeId(k)).covisible.size(), b->keyframe(KeyframeId(k)).covisible.size());
+    EXPECT_EQ(a->keyframe(KeyframeId(k)).keyframe.parent, b->keyframe(KeyframeId(k)).keyframe.parent);
+  }
+  int near_a = 0, near_b = 0;  // the grid was built anew
+  a->keyframe(KeyframeId(2)).keyframe.frame->grid.for_each_near(300, 200, 50, [&](int) { ++near_a; });
+  b->keyframe(KeyframeId(2)).keyframe.frame->grid.for_each_near(300, 200, 50, [&](int) { ++near_b; });
+  EXPECT_EQ(near_a, near_b);
+  EXPECT_GT(near_b, 0);
 }
 
 }  // namespace

@@ -10,6 +10,8 @@
 
 namespace photoslam {
 
+class Archive;
+
 struct ScheduleOptions {
   int pyramid_levels = 2;
   int uses_per_level = 4;
@@ -39,6 +41,7 @@ class KeyframeSchedule {
   Choice next(bool refining);
 
   int uses(int view) const { return uses_[static_cast<size_t>(view)]; }
+  void serialize(Archive& archive);
 
  private:
   int draw();

@@ -71,9 +71,20 @@ void PhotorealisticMapper::update_poses(const MapSnapshot& map) {
   for (size_t i = 0; i < anchors_from_world_.size(); ++i) {
     const KeyframeView& keyframe = map.keyframe(KeyframeId(static_cast<int32_t>(i)));
     anchors_from_world_[i] = keyframe.keyframe.camera_from_world;
+    if (keyframe.keyframe.scale != anchor_scales_[i]) {
+      rescale(i, keyframe.keyframe.scale / anchor_scales_[i]);
+      anchor_scales_[i] = keyframe.keyframe.scale;
+    }
     if (keyframe.median_depth > 0) depths.push_back(keyframe.median_depth);
   }
   if (!depths.empty()) scene_depth_ = lower_median(depths);
+}
+
+void PhotorealisticMapper::rescale(size_t index, double factor) {
+  model_.rescale_anchor(static_cast<int>(index), static_cast<float>(factor));
+  TrainingView& view = views_[index];
+  view.adjustment.rescale(factor);
+  for (float& depth : view.picture.depth.values()) depth *= static_cast<float>(factor);
 }
 
 void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, const KeyframeImages& images,
@@ -81,12 +92,23 @@ void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, c
   PHOTOSLAM_CHECK(static_cast<size_t>(id.value) == views_.size(), "keyframe {} after {}", id.value, views_.size());
   const Keyframe& keyframe = map.keyframe(id).keyframe;
   anchors_from_world_.push_back(keyframe.camera_from_world);
+  anchor_scales_.push_back(keyframe.scale);
   model_.add_anchor();
   schedule_.add_view();
   update_poses(map);
 
+  add_view(images.color, images.depth);
+  if (!images.right.empty()) views_.back().right = shrink_color(images.right, kSeedingFactor);
+  const size_t index = views_.size() - 1;
+  // A single camera's first keyframe has none before it to compare with: it gets its depth from the second.
+  if (index > 0 && views_[index - 1].picture.depth.empty()) seed_keyframe(map, index - 1, executor);
+  seed_keyframe(map, index, executor);
+  prune(options_.densification, scene_depth_, model_);
+}
+
+void PhotorealisticMapper::add_view(const ImageU8& color, const ImageU16& depth) {
   TrainingView& view = views_.emplace_back();
-  const CameraView full{sensor_.camera, images.color, images.depth, sensor_.mask};
+  const CameraView full{sensor_.camera, color, depth, sensor_.mask};
   for (int level = 0; level <= options_.schedule.pyramid_levels; ++level) {
     const CameraView small = level == 0 ? full : shrink(full, 1 << level);
     view.cameras.push_back(small.camera);
@@ -95,12 +117,6 @@ void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, c
     if (!small.depth.empty()) target.set_depth(small.depth.values(), static_cast<float>(sensor_.metres_per_depth_unit));
   }
   view.picture = make_picture(full, sensor_.metres_per_depth_unit);
-  if (!images.right.empty()) view.right = shrink_color(images.right, kSeedingFactor);
-  const size_t index = views_.size() - 1;
-  // A single camera's first keyframe has none before it to compare with: it gets its depth from the second.
-  if (index > 0 && views_[index - 1].picture.depth.empty()) seed_keyframe(map, index - 1, executor);
-  seed_keyframe(map, index, executor);
-  prune(options_.densification, scene_depth_, model_);
 }
 
 void PhotorealisticMapper::seed_keyframe(const MapSnapshot& map, size_t view, Executor& executor) {
@@ -247,6 +263,7 @@ KeyframeComparison PhotorealisticMapper::compare_newest(Executor& executor) {
 FrozenMap PhotorealisticMapper::freeze() const {
   FrozenMap frozen;
   frozen.anchors_from_world = anchors_from_world_;
+  frozen.keyframe_scales = anchor_scales_;
   frozen.gaussians.set_sh_degree(model_.sh_degree());
   std::vector<std::vector<splatting::Gaussian>> of_anchor(views_.size());
   model_.for_each([&](size_t i) { of_anchor[static_cast<size_t>(model_.anchor(i))].push_back(model_.get(i)); });

@@ -20,6 +20,8 @@
 
 namespace photoslam {
 
+class Archive;
+
 struct LearningRateOptions {
   double mean = 2.4e-4;
   double rotation = 5e-3;
@@ -62,6 +64,7 @@ struct FrozenMap {
   splatting::GaussianModel gaussians;
   std::vector<SE3> anchors_from_world;    ///< [K] geometric keyframe poses: frames of the gaussians.
   std::vector<SE3> keyframes_from_world;  ///< [K] camera_from_world, photometrically adjusted: what trajectories use.
+  std::vector<double> keyframe_scales;    ///< [K] Keyframe::scale
 };
 
 /// A picture and the render of the same view, both RGB.
@@ -77,7 +80,8 @@ class PhotorealisticMapper {
  public:
   PhotorealisticMapper(const PhotorealisticOptions& options, MapperSensor sensor, uint64_t seed);
 
-  /// Takes over the poses of all keyframes.
+  /// Takes over the poses of all keyframes, and with them moves the gaussians. Where a keyframe's scale has changed,
+  /// all that is measured in its frame grows with it.
   void update_poses(const MapSnapshot& map);
 
   /// Starts training on the next keyframe (by id) and seeds the part of its image that the map does not explain.
@@ -100,6 +104,10 @@ class PhotorealisticMapper {
   double training_psnr() const { return training_psnr_; }
   FrozenMap freeze() const;
 
+  /// Writes everything that training has come to, or continues from where it was written: with the same options the
+  /// next iterations are those that would have followed.
+  void serialize(Archive& archive);
+
  private:
   /// A keyframe as training material.
   struct TrainingView {
@@ -113,6 +121,9 @@ class PhotorealisticMapper {
   SE3 view_from_world(size_t view) const;
   splatting::RenderOptions render_options() const;
   splatting::TrainOptions train_options(std::optional<double> progress) const;
+  void add_view(const ImageU8& color, const ImageU16& depth);
+  void serialize_view(Archive& archive, TrainingView* view);
+  void rescale(size_t view, double factor);
   void seed_keyframe(const MapSnapshot& map, size_t view, Executor& executor);
   void sweep_picture(const MapSnapshot& map, size_t view, Executor& executor);
   void seed(size_t view, int cell, double min_color_error, std::span<const DepthPixel> features, Executor& executor);
@@ -128,6 +139,7 @@ class PhotorealisticMapper {
   splatting::RenderResult render_;
   std::vector<splatting::Pose> camera_from_anchor_;
   std::vector<SE3> anchors_from_world_;
+  std::vector<double> anchor_scales_;  // Keyframe::scale as taken over last
   std::vector<TrainingView> views_;
   double scene_depth_ = 1.0;  // median over keyframes of their median depth [m]
   int iteration_ = 0;

@@ -14,6 +14,12 @@ void PoseAdjustmentOptions::visit(OptionVisitor& v) {
   v.value({"rotation_rate_deg", "deg", 0.0, 1.0, "Step size of Adam."}, rotation_rate_deg);
 }
 
+void PoseAdjustment::rescale(double factor) {
+  correction_.translation *= factor;
+  first_moment_.head<3>() /= factor;
+  second_moment_.head<3>() /= factor * factor;
+}
+
 void PoseAdjustment::step(const PoseAdjustmentOptions& options, double scene_depth, double rate_factor,
                           std::span<const float, 6> gradient) {
   constexpr double kBeta1 = 0.9, kBeta2 = 0.99, kEpsilon = 1e-12;

@@ -9,6 +9,8 @@
 
 namespace photoslam {
 
+class Archive;
+
 struct PoseAdjustmentOptions {
   bool enabled = true;
   double translation_rate = 1.5e-4;
@@ -20,10 +22,13 @@ struct PoseAdjustmentOptions {
 class PoseAdjustment {
  public:
   const SE3& correction() const { return correction_; }
+  /// The unit of length has changed: lengths grow by the factor.
+  void rescale(double factor);
 
   /// One step against the gradient dL/dξ of T ← exp(ξ) T (translation first); `scene_depth` scales translations.
   void step(const PoseAdjustmentOptions& options, double scene_depth, double rate_factor,
             std::span<const float, 6> gradient);
+  void serialize(Archive& archive);
 
  private:
   SE3 correction_;

@@ -13,6 +13,10 @@ DepthSensor depth_sensor(const SourceInfo& info, double baseline_m) {
           .baseline_m = baseline_m};
 }
 
+double scale_of(const MapSnapshot* map, KeyframeId keyframe) {
+  return map != nullptr && map->has(keyframe) ? map->keyframe(keyframe).keyframe.scale : 1.0;
+}
+
 double milliseconds(SteadyTime from, SteadyTime to) {
   return std::chrono::duration<double, std::milli>(to - from).count();
 }
@@ -57,7 +61,7 @@ FrameOutcome LocalizationWorker::process(FedFrame fed, std::shared_ptr<const Map
   if (!right.empty()) right = to_grey(right);
   const auto features = builder_.build(frame.id, frame.timestamp_ns, to_grey(color), depth, right);
   const bool may_become_keyframe = keyframes_allowed && !outcome.held_out && is_mapped(frame);
-  TrackingResult result = tracker_.track(features, std::move(map), may_become_keyframe);
+  TrackingResult result = tracker_.track(features, map, may_become_keyframe);
   outcome.tracking_ms = wall.milliseconds();
   outcome.blocked_ms = outcome.tracking_ms - 1e3 * (thread_cpu_seconds() - cpu_before);
   if (settings_.pace == Pace::realtime) {
@@ -72,12 +76,14 @@ FrameOutcome LocalizationWorker::process(FedFrame fed, std::shared_ptr<const Map
   outcome.online_camera_from_world = result.camera_from_world;
   outcome.reference = result.reference;
   outcome.camera_from_reference = result.camera_from_reference;
+  outcome.reference_scale = scale_of(map.get(), result.reference);
   const bool is_initial_view = tracker_.initial_view() == frame.id;
   if (!result.keyframe && !is_initial_view) return outcome;
   auto images = std::make_shared<KeyframeImages>(KeyframeImages{to_rgb(color), std::move(depth), std::move(right)});
   if (result.keyframe) {
     outcome.keyframe = result.keyframe->id;
-    keyframe = NewKeyframe{std::move(*result.keyframe), images, std::move(initial_images_)};
+    const double reference_scale = scale_of(map.get(), result.keyframe->reference);
+    keyframe = NewKeyframe{std::move(*result.keyframe), images, std::move(initial_images_), reference_scale};
   }
   initial_images_ = is_initial_view ? std::move(images) : nullptr;
   return outcome;

@@ -18,6 +18,7 @@ struct NewKeyframe {
   KeyframeProposal proposal;
   std::shared_ptr<const KeyframeImages> images;
   std::shared_ptr<const KeyframeImages> initial_images;  ///< Of proposal.initial, if there is one.
+  double reference_scale = 1.0;  ///< Keyframe::scale of the proposal's reference when it was made.
 };
 
 /// Everything that happens to a frame before mapping: rectification, features, tracking, and bookkeeping of times.
@@ -29,6 +30,9 @@ class LocalizationWorker {
   double bf() const { return builder_.bf(); }
   /// What mapping needs to know of the rectified camera.
   MapperSensor sensor() const;
+
+  /// Begins lost in a map of so many keyframes, in so many separate parts.
+  void resume(int num_keyframes, int num_maps) { tracker_.resume(num_keyframes, num_maps); }
 
   /// `keyframes_allowed` is false while mapping cannot take another one.
   FrameOutcome process(FedFrame fed, std::shared_ptr<const MapSnapshot> map, bool keyframes_allowed,

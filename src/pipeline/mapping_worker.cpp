@@ -3,6 +3,7 @@
 #include "pipeline/mapping_worker.h"
 
 #include "base/clock.h"
+#include "pipeline/session_file.h"
 
 namespace photoslam {
 
@@ -10,6 +11,7 @@ MappingWorker::MappingWorker(const SystemOptions& options, const RunSettings& se
                              Executor& executor)
     : mapper_(options.photorealistic_mapping, std::move(sensor), settings.seed),
       executor_(executor),
+      session_file_(settings.session_file),
       preview_(settings.preview) {}
 
 void MappingWorker::freeze_if_due() {
@@ -19,12 +21,21 @@ void MappingWorker::freeze_if_due() {
 
 void MappingWorker::handle(MappingMessage message) {
   freeze_if_due();
-  if (message.update.map) {
+  if (message.update.map && !message.update.keyframe.valid()) {
+    mapper_.update_poses(*message.update.map);
+  } else if (message.update.map) {
     mapper_.add_keyframe(*message.update.map, message.update.keyframe, *message.update.images, executor_);
   }
+  // Should this fail, the save at the end will say so.
+  if (message.update.session) (void)save(*message.update.session);
   train(message.iterations);
   gaussians = mapper_.gaussians().size();
   cpu_seconds = thread_cpu_seconds();
+}
+
+Status MappingWorker::save(Archive& session) {
+  mapper_.serialize(session);
+  return write_session(session_file_, session);
 }
 
 bool MappingWorker::train_while_idle() {

@@ -5,23 +5,26 @@
 #include <atomic>
 #include <memory>
 
+#include "base/archive.h"
 #include "base/clock.h"
 #include "base/executor.h"
+#include "base/result.h"
 #include "pipeline/frame_feed.h"
 #include "pipeline/system_options.h"
 
 namespace photoslam {
 
-/// A keyframe has entered the geometric map.
+/// The geometric map has changed: by a keyframe that entered it or, without one, by a loop.
 struct MapUpdate {
   std::shared_ptr<const MapSnapshot> map;
   KeyframeId keyframe;
   std::shared_ptr<const KeyframeImages> images;
+  std::shared_ptr<Archive> session;  ///< To be completed and saved; usually none.
 };
 
-/// What photorealistic mapping is asked to do: first take over the keyframe, if there is one, then train.
+/// What photorealistic mapping is asked to do: first take over the change, if there is one, then train.
 struct MappingMessage {
-  MapUpdate update;    ///< Without a map: no keyframe.
+  MapUpdate update;    ///< Without a map: nothing has changed.
   int iterations = 0;  ///< By logical time: so many, now.
 };
 
@@ -54,6 +57,9 @@ class MappingWorker {
   std::atomic<double> training_psnr{0};
   std::atomic<double> cpu_seconds{0};  ///< Of the mapping thread itself, its helpers not included.
 
+  /// Appends the photorealistic map and writes the file.
+  Status save(Archive& session);
+
  private:
   void train(int count);
   void freeze_if_due();
@@ -61,6 +67,7 @@ class MappingWorker {
 
   PhotorealisticMapper mapper_;
   Executor& executor_;
+  std::filesystem::path session_file_;
   std::atomic<SteadyTime::rep> freeze_time_{std::numeric_limits<SteadyTime::rep>::max()};
   std::optional<FrozenMap> online_;
   bool preview_;

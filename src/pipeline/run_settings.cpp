@@ -11,7 +11,10 @@ std::optional<SE3> camera_from_world(const FrameOutcome& frame, const FrozenMap&
   if (!frame.has_pose || static_cast<size_t>(frame.reference.value) >= map.keyframes_from_world.size()) {
     return std::nullopt;
   }
-  return frame.camera_from_reference * map.keyframes_from_world[static_cast<size_t>(frame.reference.value)];
+  const auto reference = static_cast<size_t>(frame.reference.value);
+  SE3 camera_from_reference = frame.camera_from_reference;
+  camera_from_reference.translation *= map.keyframe_scales[reference] / frame.reference_scale;
+  return camera_from_reference * map.keyframes_from_world[reference];
 }
 
 std::vector<FrameOutcome> connected_frames(const RunOutcome& run) {

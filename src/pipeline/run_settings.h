@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,6 +35,10 @@ struct RunSettings {
   bool preview = false;       ///< Progress carries pictures of what is being mapped, about once a second.
   bool logical_time = false;  ///< Tracking waits for the mapper; set by deterministic, or to spend a fixed number of
                               ///< iterations per frame.
+  std::shared_ptr<const std::string> loaded_session;  ///< Bytes of a session to continue; none: a new map.
+  bool localize_only = false;                         ///< Track in the loaded map and leave it as it is.
+  std::filesystem::path session_file;                 ///< Where the session goes at the end; empty: nowhere …
+  double autosave_s = 0;                              ///< … and in between, this often; 0: never.
 };
 
 /// What became of one input frame.
@@ -51,7 +57,8 @@ struct FrameOutcome {
   bool has_pose = false;
   SE3 online_camera_from_world;  ///< As published at the time.
   KeyframeId reference;
-  SE3 camera_from_reference;  ///< The final pose follows the reference keyframe.
+  SE3 camera_from_reference;     ///< The final pose follows the reference keyframe …
+  double reference_scale = 1.0;  ///< … as it grows from this Keyframe::scale on.
 };
 
 /// One point of the quality curve of the refinement.
@@ -67,6 +74,8 @@ struct RunOutcome {
   FrozenMap online;                  ///< When all keyframes were consumed, at most 1 s after the last frame.
   FrozenMap final;                   ///< After refinement.
   int iterations = 0;
+  int loops_closed = 0;
+  int loops_reconnected = 0;  ///< Times that tracking itself came back to an old part of the map.
   double mapping_cpu_seconds = 0;
   double seconds_online = 0, seconds_drain = 0, seconds_refine = 0, seconds_total = 0;
   std::vector<RefinementPoint> refinement;

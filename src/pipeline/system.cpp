@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/system.h"
 
+#include <algorithm>
 #include <condition_variable>
 #include <deque>
 #include <mutex>
@@ -9,8 +10,10 @@
 
 #include "base/clock.h"
 #include "map/connected_components.h"
+#include "pipeline/config.h"
 #include "pipeline/localization_worker.h"
 #include "pipeline/mapping_worker.h"
+#include "pipeline/session_file.h"
 #include "pipeline/stage.h"
 
 namespace photoslam {
@@ -25,11 +28,17 @@ int num_threads(const RunSettings& settings) {
   return settings.threads > 0 ? settings.threads : cores;
 }
 
+/// A keyframe, or nothing: then loop closure has found a correction.
+using GeometryMessage = std::optional<NewKeyframe>;
+/// The map has changed.
+struct LoopMessage {};
+
 /// The running system. Frames flow feed → localization → geometry mapping → photorealistic mapping.
 ///
-/// In real time each stage takes the newest state of the others. By logical time a keyframe made at frame k reaches
-/// tracking and photorealistic mapping exactly at frame k + lag, and mapping trains a fixed number of iterations per
-/// frame: what happens does not depend on how fast anything runs.
+/// In real time each stage takes the newest state of the others; loop closure watches the map on a thread of its own
+/// and sends corrections to geometry mapping. By logical time a keyframe made at frame k reaches tracking and
+/// photorealistic mapping exactly at frame k + lag, and mapping trains a fixed number of iterations per frame, and
+/// loops are closed before the keyframe is passed on: what happens does not depend on how fast anything runs.
 class Session {
  public:
   Session(const SystemOptions& options, const RunSettings& settings, FrameSource& source, std::stop_token stop)
@@ -44,20 +53,32 @@ class Session {
         executor_(num_threads(settings), lower_thread_priority),
         localization_(options, settings, source.info()),
         geometry_(options.geometry_mapping, options.features, localization_.camera(), localization_.bf()),
+        loop_closer_(options.loop_closure, options.features, localization_.camera(), localization_.bf()),
         mapping_(options, settings, localization_.sensor(), executor_),
         mapping_stage_(kStageQueue, threaded_, mapping_work(), failures_),
         geometry_stage_(kStageQueue, threaded_, geometry_work(), failures_),
+        loop_stage_(kStageQueue, threaded_, loop_work(), failures_),
         feed_(source, logical_time_ ? Pace::asap : settings.pace, static_cast<size_t>(options.pipeline.input_queue),
-              threaded_, stop_.get_token(), failures_) {}
+              threaded_, stop_.get_token(), failures_) {
+    if (settings_.loaded_session) load_session();
+  }
 
   RunOutcome run(const std::function<void(const Progress&)>& on_progress);
 
  private:
-  Stage<NewKeyframe>::Work geometry_work();
+  Stage<GeometryMessage>::Work geometry_work();
+  Stage<LoopMessage>::Work loop_work();
   Stage<MappingMessage>::Work mapping_work();
   void localize_all(const std::function<void()>& after_each_frame);
   void localize(FedFrame fed);
   void record(FrameOutcome outcome);
+  void add_keyframe(NewKeyframe keyframe);
+  void take_correction();
+  void look_for_loops();
+  void close_remaining_loops();
+  void load_session();
+  std::shared_ptr<Archive> begin_session();
+  void save_session();
   void deliver(MapUpdate update);
   void receive_due_updates();
   void refine(const std::function<void(const Progress&)>& on_progress);
@@ -77,6 +98,7 @@ class Session {
   ThreadPool executor_;
   LocalizationWorker localization_;
   GeometryMapper geometry_;
+  LoopCloser loop_closer_;
   MappingWorker mapping_;
 
   // Real time: the newest map. Logical time: results in order, each taken when its frame has come.
@@ -85,9 +107,11 @@ class Session {
   std::condition_variable localization_ended_;
   std::shared_ptr<const MapSnapshot> newest_map_;
   std::deque<MapUpdate> updates_;
+  std::optional<MapCorrection> found_correction_;  // by loop closure, on its way to the map
   bool localization_done_ = false;
   std::vector<FrameOutcome> outcomes_;
   int num_dropped_ = 0;
+  double last_save_s_ = 0;  // geometry thread only
 
   // Localization thread only.
   std::shared_ptr<const MapSnapshot> visible_map_;
@@ -98,27 +122,125 @@ class Session {
   RunOutcome outcome_;
 
   Stage<MappingMessage> mapping_stage_;
-  Stage<NewKeyframe> geometry_stage_;
+  Stage<GeometryMessage> geometry_stage_;
+  Stage<LoopMessage> loop_stage_;
   FrameFeed feed_;
 };
 
-Stage<NewKeyframe>::Work Session::geometry_work() {
-  const auto process = [this](NewKeyframe keyframe) {
-    const auto interrupted = [this] { return !logical_time_ && geometry_stage_.backlog() > 0; };
-    GeometryUpdate update = geometry_.process(keyframe.proposal, interrupted);
-    if (const auto& initial = keyframe.proposal.initial) {
-      deliver({update.map, initial->id, std::move(keyframe.initial_images)});
+void Session::load_session() {
+  Archive reader(*settings_.loaded_session);
+  SessionHeader header;
+  reader(header);
+  if ((header.bf > 0) != (localization_.bf() > 0)) {
+    failures_.report("session", "made with another kind of sensor: depth was measured in only one of both");
+    return;
+  }
+  reader(geometry_, mapping_.mapper());
+  newest_map_ = geometry_.snapshot();
+  visible_map_ = newest_map_;
+  loop_closer_.resume(*newest_map_);
+  const auto num_maps =
+      std::ranges::count_if(newest_map_->keyframes, [](const auto& view) { return !view->keyframe.parent.valid(); });
+  localization_.resume(static_cast<int>(newest_map_->keyframes.size()), static_cast<int>(num_maps));
+  mapping_.gaussians = mapping_.mapper().gaussians().size();
+}
+
+/// Header and geometric map; the photorealistic map follows.
+std::shared_ptr<Archive> Session::begin_session() {
+  auto session = std::make_shared<Archive>();
+  SessionHeader header{localization_.camera(), localization_.bf(), config_as_toml(options_)};
+  (*session)(header, geometry_);
+  last_save_s_ = clock_.seconds();
+  return session;
+}
+
+/// After all stages have ended.
+void Session::save_session() {
+  if (settings_.session_file.empty() || settings_.localize_only || !mapping_.mapper().has_keyframes()) return;
+  if (const Status status = mapping_.save(*begin_session()); !status) {
+    failures_.report("session", status.error().message);
+  }
+}
+
+Stage<GeometryMessage>::Work Session::geometry_work() {
+  const auto handle = [this](GeometryMessage message) {
+    if (message) {
+      add_keyframe(std::move(*message));
+    } else {
+      take_correction();
     }
-    deliver({std::move(update.map), update.keyframe, std::move(keyframe.images)});
   };
-  return {.name = "geometry mapping", .handle = process};
+  return {.name = "geometry mapping", .handle = handle};
+}
+
+Stage<LoopMessage>::Work Session::loop_work() {
+  return {
+      .name = "loop closure", .handle = [this](LoopMessage) { look_for_loops(); }, .on_start = lower_thread_priority};
+}
+
+void Session::add_keyframe(NewKeyframe keyframe) {
+  KeyframeProposal& proposal = keyframe.proposal;
+  const bool is_known =
+      proposal.reference.valid() && static_cast<size_t>(proposal.reference.value) < geometry_.map().num_keyframes();
+  if (is_known) {
+    proposal.camera_from_reference.translation *=
+        geometry_.map().keyframe(proposal.reference).scale / keyframe.reference_scale;
+  }
+  const auto interrupted = [this] { return !logical_time_ && geometry_stage_.backlog() > 0; };
+  GeometryUpdate update = geometry_.process(proposal, interrupted);
+  if (logical_time_) {
+    while (const auto correction = loop_closer_.process(*update.map)) update.map = geometry_.correct(*correction);
+  }
+  if (const auto& initial = proposal.initial) {
+    deliver({update.map, initial->id, std::move(keyframe.initial_images), nullptr});
+  }
+  const bool save = settings_.autosave_s > 0 && !settings_.session_file.empty() &&
+                    clock_.seconds() - last_save_s_ >= settings_.autosave_s;
+  deliver({std::move(update.map), update.keyframe, std::move(keyframe.images), save ? begin_session() : nullptr});
+}
+
+/// On the geometry thread.
+void Session::take_correction() {
+  std::optional<MapCorrection> correction;
+  {
+    std::lock_guard lock(mutex_);
+    correction.swap(found_correction_);
+  }
+  if (correction) deliver({geometry_.correct(*correction), KeyframeId{}, nullptr, nullptr});
+}
+
+/// On the thread of loop closure.
+void Session::look_for_loops() {
+  std::shared_ptr<const MapSnapshot> map;
+  {
+    std::lock_guard lock(mutex_);
+    map = newest_map_;
+  }
+  std::optional<MapCorrection> correction = loop_closer_.process(*map, [this] { return stop_.stop_requested(); });
+  if (!correction) return;
+  {
+    std::lock_guard lock(mutex_);
+    found_correction_ = std::move(correction);
+  }
+  geometry_stage_.post(std::nullopt);
+}
+
+/// After both stages have ended: what loop closure found last, and what it has not looked at yet.
+void Session::close_remaining_loops() {
+  if (logical_time_) return;
+  take_correction();
+  while (newest_map_) {
+    const auto correction = loop_closer_.process(*newest_map_);
+    if (!correction) return;
+    deliver({geometry_.correct(*correction), KeyframeId{}, nullptr, nullptr});
+  }
 }
 
 Stage<MappingMessage>::Work Session::mapping_work() {
   Stage<MappingMessage>::Work work;
   work.name = "photorealistic mapping";
   work.handle = [this](MappingMessage message) { mapping_.handle(std::move(message)); };
-  if (!logical_time_) work.idle = [this] { return mapping_.train_while_idle(); };
+  if (!logical_time_ && !settings_.localize_only) work.idle = [this] { return mapping_.train_while_idle(); };
   work.on_start = lower_thread_priority;
   return work;
 }
@@ -130,7 +252,10 @@ void Session::deliver(MapUpdate update) {
     if (logical_time_) updates_.push_back(update);
   }
   update_arrived_.notify_all();
-  if (!logical_time_) mapping_stage_.post({std::move(update)});
+  if (logical_time_) return;
+  mapping_stage_.post({std::move(update)});
+  // One message is enough for loop closure to look at the newest map.
+  if (options_.loop_closure.enabled && loop_stage_.backlog() == 0) loop_stage_.post({});
 }
 
 void Session::receive_due_updates() {
@@ -168,15 +293,17 @@ void Session::localize(FedFrame fed) {
   next_frame_id_ = fed.frame.id.value + 1;
 
   const bool mapping_keeps_up =
-      logical_time_ || geometry_stage_.backlog() < static_cast<size_t>(options_.pipeline.keyframe_queue);
+      !settings_.localize_only &&
+      (logical_time_ || geometry_stage_.backlog() < static_cast<size_t>(options_.pipeline.keyframe_queue));
   std::optional<NewKeyframe> keyframe;
   record(localization_.process(std::move(fed), visible_map_, mapping_keeps_up, keyframe));
   if (keyframe) {
     const size_t num_updates = keyframe->proposal.initial ? 2 : 1;
     update_due_.insert(update_due_.end(), num_updates, frame_number_ + options_.pipeline.keyframe_lag_frames);
-    geometry_stage_.post(std::move(*keyframe));
+    geometry_stage_.post(std::move(keyframe));
   }
-  if (logical_time_) mapping_stage_.post({.update = {}, .iterations = options_.pipeline.iterations_per_frame});
+  if (logical_time_ && !settings_.localize_only)
+    mapping_stage_.post({.update = {}, .iterations = options_.pipeline.iterations_per_frame});
   ++frame_number_;
 }
 
@@ -190,6 +317,12 @@ void Session::localize_all(const std::function<void()>& after_each_frame) {
     failures_.report("localization", e.what());
   }
   geometry_stage_.finish();
+  loop_stage_.finish();
+  try {
+    close_remaining_loops();
+  } catch (const std::exception& e) {
+    failures_.report("loop closure", e.what());
+  }
   frame_number_ = std::numeric_limits<int>::max();
   receive_due_updates();
 }
@@ -223,7 +356,7 @@ Progress Session::progress(Progress::Phase phase) const {
 }
 
 void Session::refine(const std::function<void(const Progress&)>& on_progress) {
-  if (!mapping_.mapper().has_keyframes()) return;
+  if (!mapping_.mapper().has_keyframes() || settings_.localize_only) return;
   const Stopwatch clock;
   double last_report = 0;
   for (int i = 0; !stop_.stop_requested(); ++i) {
@@ -276,10 +409,13 @@ RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress)
   outcome_.seconds_drain = drain.seconds();
   refine(on_progress);
   outcome_.final = mapping_.mapper().freeze();
+  save_session();
 
   outcome_.frames = std::move(outcomes_);
   if (newest_map_) outcome_.component_of_keyframe = connected_components(*newest_map_);
   outcome_.iterations = mapping_.iterations;
+  outcome_.loops_closed = loop_closer_.num_closed();
+  outcome_.loops_reconnected = loop_closer_.num_reconnected();
   outcome_.mapping_cpu_seconds = mapping_.cpu_seconds;
   outcome_.seconds_total = clock_.seconds();
   outcome_.interrupted = outer_stop_.stop_requested();

@@ -23,6 +23,7 @@ void SystemOptions::visit(OptionVisitor& v) {
   v.group("stereo", "Depth from a second camera.", stereo);
   v.group("localization", "Camera tracking.", localization);
   v.group("geometry_mapping", "Landmarks, keyframes and local bundle adjustment.", geometry_mapping);
+  v.group("loop_closure", "Places visited again, and the correction of the drift since.", loop_closure);
   v.group("photorealistic_mapping", "The gaussians.", photorealistic_mapping);
   v.group("pipeline", "How the components work together.", pipeline);
 }

@@ -7,6 +7,7 @@
 #include "geometry_mapping/geometry_mapper.h"
 #include "localization/feature_frame_builder.h"
 #include "localization/tracker.h"
+#include "loop_closure/loop_closer.h"
 #include "photorealistic_mapping/photorealistic_mapper.h"
 
 namespace photoslam {
@@ -27,6 +28,7 @@ struct SystemOptions {
   StereoOptions stereo;
   TrackerOptions localization;
   GeometryMapperOptions geometry_mapping;
+  LoopClosureOptions loop_closure;
   PhotorealisticOptions photorealistic_mapping;
   PipelineOptions pipeline;
   void visit(OptionVisitor& visitor);

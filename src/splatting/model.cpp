@@ -10,6 +10,7 @@
 #include <numeric>
 #include <utility>
 
+#include "base/archive.h"
 #include "base/check.h"
 
 namespace photoslam::splatting {
@@ -247,6 +248,9 @@ void GaussianModel::rescale_anchor(int anchor, float factor) {
     for (int lane = 0; lane < block.count; ++lane) {
       for (int i = 0; i < 3; ++i) block.parameters[row::kMean + i][lane] *= factor;
       for (int i = 0; i < 3; ++i) block.parameters[row::kLogScale + i][lane] += log_factor;
+      // Gradients by the mean shrink as lengths grow, and what the optimiser remembers of them does as well.
+      for (int i = 0; i < 3; ++i) block.first_moments[row::kMean + i][lane] /= factor;
+      for (int i = 0; i < 3; ++i) block.second_moments[row::kMean + i][lane] /= factor * factor;
     }
     update_bounds(b);
   }
@@ -300,6 +304,35 @@ void GaussianModel::sort_spatially() {
 void GaussianModel::set_sh_degree(int degree) {
   PHOTOSLAM_CHECK(degree >= 0 && degree <= kMaxShDegree, "degree {}", degree);
   sh_degree_ = degree;
+}
+
+void GaussianModel::serialize(Archive& a) {
+  uint64_t num_anchors = blocks_of_anchor_.size(), num_blocks = blocks_.size();
+  a(sh_degree_, num_anchors, num_blocks);
+  if (a.reading()) {
+    blocks_of_anchor_.assign(num_anchors, {});
+    blocks_.clear();
+    size_ = 0;
+  }
+  for (uint64_t b = 0; b < num_blocks; ++b) {
+    if (a.reading()) blocks_.push_back(std::make_unique<Block>(Block{}));
+    Block& block = *blocks_[b];
+    a(block.anchor, block.count);
+    PHOTOSLAM_CHECK(block.anchor >= 0 && block.anchor < static_cast<int32_t>(num_anchors) && block.count >= 0 &&
+                        block.count <= kBlockSize,
+                    "anchor {}, count {}", block.anchor, block.count);
+    for (float& c : block.center) a(c);
+    a(block.radius, block.max_scale);
+    for_each_row(block, [&](auto& values) {
+      // Whole rows are zero where spherical harmonics of higher degree are not in use.
+      uint8_t is_used = std::any_of(values, values + block.count, [](auto v) { return v != 0; }) ? 1 : 0;
+      a(is_used);
+      if (is_used != 0) a.raw(values, sizeof(values[0]) * static_cast<size_t>(block.count));
+    });
+    if (!a.reading()) continue;
+    blocks_of_anchor_[static_cast<size_t>(block.anchor)].push_back(static_cast<uint32_t>(b));
+    size_ += static_cast<size_t>(block.count);
+  }
 }
 
 }  // namespace photoslam::splatting

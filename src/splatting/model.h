@@ -11,6 +11,10 @@
 
 #include "splatting/gaussian.h"
 
+namespace photoslam {
+class Archive;
+}
+
 namespace photoslam::splatting {
 
 inline constexpr int kBlockSize = 64;
@@ -112,6 +116,9 @@ class GaussianModel {
   /// Reorders the gaussians of every anchor along a space-filling curve so that blocks are compact in space.
   /// All indices change; statistics, optimiser state and tags move along.
   void sort_spatially();
+
+  /// Writes gaussians, optimiser state and statistics, or replaces them by those read.
+  void serialize(Archive& archive);
 
   /// Degree of the spherical harmonics in use, [0, 3]; higher coefficients are neither read nor trained.
   int sh_degree() const { return sh_degree_; }

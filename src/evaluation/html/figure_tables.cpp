@@ -125,6 +125,7 @@ std::string mapping_table(const Report& report) {
       .row("refinement", show(m.seconds_refine, 1, "s"))
       .row("file size", show(report.map.size_mb, 1, "MB"))
       .row("loops closed", show(report.loops.closed))
+      .row("loops reconnected", show(report.loops.reconnected))
       .text();
 }
 

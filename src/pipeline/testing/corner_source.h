@@ -58,6 +58,7 @@ class CornerSource final : public FrameSource {
 
   int throw_at = -1;   ///< next() throws instead of delivering this frame.
   int defect_at = -1;  ///< This frame cannot be read.
+  int start_at = 0;    ///< The walk begins where it would be after so many frames.
 
  private:
   static constexpr int kTexture = 64;
@@ -82,7 +83,7 @@ class CornerSource final : public FrameSource {
   }
 
   Frame draw(int index) const {
-    const SE3 camera_from_world = CornerSource::camera_from_world(index);
+    const SE3 camera_from_world = CornerSource::camera_from_world(start_at + index);
     Frame frame;
     frame.id = FrameId(index);
     frame.timestamp_ns = static_cast<int64_t>(index) * 1'000'000'000 / 30;

@@ -1,0 +1,66 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "math/archive.h"
+#include "photorealistic_mapping/photorealistic_mapper.h"
+
+namespace photoslam {
+namespace {
+
+template <class T>
+void serialize_image(Archive& a, Image<T>& image) {
+  int width = image.width(), height = image.height(), channels = image.channels();
+  a(width, height, channels);
+  if (a.reading()) image = width > 0 ? Image<T>(width, height, channels) : Image<T>();
+  a.raw(image.values().data(), image.values().size_bytes());
+}
+
+/// The picture a target was made from.
+ImageU8 color_of(const splatting::TargetImage& target) {
+  ImageU8 color(target.width(), target.height(), 3);
+  const size_t pixels = target.planes().size() / 3;
+  for (size_t i = 0; i < pixels; ++i) {
+    for (size_t c = 0; c < 3; ++c) color.values()[3 * i + c] = target.planes()[c * pixels + i];
+  }
+  return color;
+}
+
+ImageU16 depth_of(const splatting::TargetImage& target) {
+  if (!target.has_depth()) return {};
+  ImageU16 depth(target.width(), target.height());
+  std::ranges::copy(target.depth(), depth.values().begin());
+  return depth;
+}
+
+}  // namespace
+
+void PoseAdjustment::serialize(Archive& a) { a(correction_, first_moment_, second_moment_, steps_); }
+
+void KeyframeSchedule::serialize(Archive& a) { a(random_, uses_, round_); }
+
+void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
+  ImageU8 color;
+  ImageU16 depth;
+  if (!a.reading()) {
+    color = color_of(view->targets[0]);
+    depth = depth_of(view->targets[0]);
+  }
+  serialize_image(a, color);
+  serialize_image(a, depth);
+  if (a.reading()) {
+    add_view(color, depth);
+    view = &views_.back();
+  }
+  a(view->adjustment);
+  serialize_image(a, view->picture.depth);
+  serialize_image(a, view->right);
+}
+
+void PhotorealisticMapper::serialize(Archive& a) {
+  uint64_t num_views = views_.size();
+  a(random_, schedule_, model_, anchors_from_world_, anchor_scales_, scene_depth_, iteration_, training_psnr_,
+    num_views);
+  if (a.reading()) views_.clear();
+  for (uint64_t i = 0; i < num_views; ++i) serialize_view(a, a.reading() ? nullptr : &views_[i]);
+}
+
+}  // namespace photoslam

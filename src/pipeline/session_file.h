@@ -1,0 +1,35 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "base/archive.h"
+#include "base/result.h"
+#include "camera/pinhole.h"
+
+namespace photoslam {
+
+/// What a session says of itself before the map begins.
+struct SessionHeader {
+  PinholeCamera camera;       ///< Undistorted or rectified, as everything in the map sees the world.
+  double bf = 0;              ///< fx * baseline [px m]; 0: one camera without depth.
+  std::string configuration;  ///< TOML, for the record.
+  void serialize(Archive& archive);
+};
+
+/// The file of a session: header, geometric map, photorealistic map, in one archive. Written atomically, so that the
+/// session before survives a crash at any moment.
+Status write_session(const std::filesystem::path& path, const Archive& session);
+
+/// The bytes of a session, checked; its folder may be given instead of the file.
+Result<std::string> read_session(const std::filesystem::path& path);
+
+/// What the bytes begin with.
+SessionHeader session_header(const std::string& session);
+
+/// Whether frames of a camera fit to a session: the error says what differs.
+Status check_session_camera(const SessionHeader& session, const PinholeCamera& camera);
+
+}  // namespace photoslam

@@ -1,0 +1,141 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "pipeline/session_file.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstring>
+
+#include "base/file.h"
+#include "pipeline/system.h"
+#include "pipeline/testing/corner_source.h"
+
+namespace photoslam {
+namespace {
+
+using testing::CornerSource;
+
+/// A walk of 60 frames, saved as a session.
+class SessionTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder = std::filesystem::temp_directory_path() / fmt::format("photoslam-session-{}", ::getpid());
+    std::filesystem::create_directories(folder);
+    first = new RunOutcome(run(60, settings("session.photoslam")));
+    bytes = std::make_shared<const std::string>(*read_session(folder));
+  }
+  static void TearDownTestSuite() {
+    delete first;
+    bytes.reset();
+    std::filesystem::remove_all(folder);
+  }
+
+  static RunSettings settings(const std::string& file) {
+    RunSettings result;
+    result.deterministic = true;
+    result.threads = 2;
+    if (!file.empty()) result.session_file = folder / file;
+    return result;
+  }
+  static RunSettings continuing(const std::string& file) {
+    RunSettings result = settings(file);
+    result.loaded_session = bytes;
+    return result;
+  }
+  static RunOutcome run(int num_frames, const RunSettings& settings, int start_at = 0) {
+    SystemOptions options;
+    options.pipeline.iterations_per_frame = 1;
+    CornerSource source(num_frames);
+    source.start_at = start_at;
+    return run_slam(options, settings, source);
+  }
+
+  inline static std::filesystem::path folder;
+  inline static RunOutcome* first = nullptr;
+  inline static std::shared_ptr<const std::string> bytes;
+};
+
+TEST_F(SessionTest, HasTheSameBytesAtAnyNumberOfThreads) {
+  RunSettings one = settings("one");
+  one.threads = 1;
+  run(60, one);
+  EXPECT_TRUE(*read_session(folder / "one") == *bytes);
+}
+
+TEST_F(SessionTest, LoadedAndSavedAgainHasTheSameBytes) {
+  run(0, continuing("again"));
+  EXPECT_TRUE(*read_session(folder / "again") == *bytes);
+}
+
+TEST_F(SessionTest, LocalizesInTheLoadedMapWithinASecondAnywhere) {
+  RunSettings localize = continuing("never-written");
+  localize.localize_only = true;
+  int found = 0;
+  for (int place = 0; place < 50; ++place) {
+    const RunOutcome outcome = run(12, localize, place);
+    EXPECT_EQ(outcome.failure, "");
+    EXPECT_EQ(outcome.final.keyframes_from_world.size(), first->final.keyframes_from_world.size());
+    const FrameOutcome& last = outcome.frames.back();
+    if (!last.has_pose) continue;
+    const SE3 error =
+        camera_from_world(last, outcome.final).value() * CornerSource::camera_from_world(place + 11).inverse();
+    if (error.translation.norm() < 0.05) ++found;
+  }
+  EXPECT_GE(found, 48);
+  EXPECT_FALSE(std::filesystem::exists(folder / "never-written"));
+}
+
+TEST_F(SessionTest, LocalizingLeavesTheMapAsItIs) {
+  RunSettings localize = continuing("");
+  localize.localize_only = true;
+  const RunOutcome outcome = run(30, localize, 10);
+  ASSERT_EQ(outcome.final.gaussians.size(), first->final.gaussians.size());
+  outcome.final.gaussians.for_each([&](size_t i) {
+    const splatting::Gaussian a = outcome.final.gaussians.get(i), b = first->final.gaussians.get(i);
+    ASSERT_EQ(std::memcmp(&a, &b, sizeof(a)), 0) << i;
+  });
+}
+
+TEST_F(SessionTest, GoesOnMappingWhereTheOtherEnded) {
+  const RunOutcome outcome = run(60, continuing("longer"), 50);
+  EXPECT_EQ(outcome.failure, "");
+  EXPECT_GT(outcome.final.keyframes_from_world.size(), first->final.keyframes_from_world.size());
+  const auto known = static_cast<int>(first->final.keyframes_from_world.size());
+  size_t of_new_keyframes = 0;
+  outcome.final.gaussians.for_each([&](size_t i) { of_new_keyframes += outcome.final.gaussians.anchor(i) >= known; });
+  EXPECT_GT(of_new_keyframes, 0u);
+  const auto pose = camera_from_world(outcome.frames.back(), outcome.final);
+  ASSERT_TRUE(pose.has_value());
+  const SE3 error = *pose * CornerSource::camera_from_world(109).inverse();
+  EXPECT_LT(error.translation.norm(), 0.05);
+  EXPECT_GT(read_session(folder / "longer")->size(), bytes->size());
+}
+
+TEST_F(SessionTest, AutosavesAreWholeSessions) {
+  RunSettings often = settings("often");
+  often.autosave_s = 1e-3;
+  often.deterministic = false;
+  often.pace = Pace::asap;
+  run(60, often);
+  const auto session = read_session(folder / "often");
+  ASSERT_TRUE(session) << session.error().message;
+  RunSettings localize = continuing("");
+  localize.loaded_session = std::make_shared<const std::string>(*session);
+  localize.localize_only = true;
+  EXPECT_TRUE(run(12, localize, 20).frames.back().has_pose);
+}
+
+TEST_F(SessionTest, AnotherCameraIsRefused) {
+  const SessionHeader header = session_header(*bytes);
+  EXPECT_TRUE(check_session_camera(header, header.camera));
+  EXPECT_NE(header.configuration.find("[localization"), std::string::npos);
+  PinholeCamera other = header.camera;
+  other.fx *= 1.01;
+  const Status status = check_session_camera(header, other);
+  ASSERT_FALSE(status);
+  EXPECT_NE(status.error().message.find("same camera"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace photoslam
