@@ -20,6 +20,7 @@ TEST(ConnectedFrames, TrajectoriesLeaveOutMapsThatAreNotConnectedWithTheLargest)
   RunOutcome run;
   run.frames = {frame(0, 0), frame(1, -1), frame(2, 1), frame(3, 1), frame(4, 2), frame(5, 0)};
   run.final.keyframes_from_world.resize(3);
+  run.final.keyframe_scales.assign(3, 1.0);
   const auto times = [](const Trajectory& trajectory) {
     std::vector<int64_t> result;
     for (const StampedPose& pose : trajectory) result.push_back(pose.timestamp_ns);
