@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include "base/check.h"
 #include "splatting/cpu/targets.h"
@@ -146,6 +147,13 @@ namespace {
 
 HWY_EXPORT(project_block);
 
+/// Whether the intrinsics are numbers. Comparisons below would let some that are not through: what a conversion of them
+/// to an integer gives differs between processors.
+bool is_sane(const Camera& camera) {
+  const float members[] = {camera.fx, camera.fy, camera.cx, camera.cy};
+  return std::ranges::all_of(members, [](float value) { return std::abs(value) < kAbsurd; });
+}
+
 AnchorView make_anchor_view(const Pose& pose, const Camera& camera, float near) {
   AnchorView view{};
   const double* r = pose.rotation;
@@ -171,7 +179,7 @@ AnchorView make_anchor_view(const Pose& pose, const Camera& camera, float near) 
   view.max_x = (w - 0.5f - camera.cx + 0.15f * w) / camera.fx;
   view.min_y = (-(camera.cy + 0.5f) - 0.15f * h) / camera.fy;
   view.max_y = (h - 0.5f - camera.cy + 0.15f * h) / camera.fy;
-  view.near = near;
+  view.near = is_sane(camera) ? near : std::numeric_limits<float>::infinity();  // nothing lies beyond it
   return view;
 }
 
