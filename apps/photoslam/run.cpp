@@ -46,7 +46,7 @@ struct RunArguments {
 Status configure(const RunArguments& arguments, SystemOptions& options, RunSettings& settings) {
   Result<SystemOptions> loaded = arguments.config.load();
   if (!loaded) return loaded.error();
-  options = std::move(*loaded);
+  options = *loaded;
   settings = arguments.settings;
   if (arguments.iterations_per_frame >= 0) {
     options.pipeline.iterations_per_frame = arguments.iterations_per_frame;
