@@ -15,8 +15,8 @@ namespace photoslam {
 /// right, y up, z backwards). Rows with a value that is not finite, or out of range, are left out and counted.
 Result<GaussianPlyReport> write_gaussian_spz(const std::filesystem::path& path, const GaussianTable& gaussians);
 
-/// Writes the simplest file of web viewers (.splat): 32 bytes each, colours without dependence on the view, nearest the
-/// origin of importance first (opacity times size). Rows with a value that is not finite are left out and counted.
+/// Writes the simplest file of web viewers (.splat): 32 bytes each, colours without dependence on the view, those of
+/// largest opacity times size first. Rows with a value that is not finite are left out and counted.
 Result<GaussianPlyReport> write_gaussian_splat(const std::filesystem::path& path, const GaussianTable& gaussians);
 
 }  // namespace photoslam

@@ -176,16 +176,8 @@ void PhotorealisticMapper::seed(size_t index, int cell, double min_color_error, 
   seeds.resize(std::min(seeds.size(), limit - std::min(limit, model_.size())));
   // Seeds are made in the frame of the adjusted view; the anchor is the geometric keyframe.
   const SE3 anchor_from_view = view.adjustment.correction().inverse();
-  for (splatting::Gaussian& g : seeds) {
-    const Vec3 mean = anchor_from_view * Vec3(static_cast<double>(g.mean[0]), static_cast<double>(g.mean[1]),
-                                              static_cast<double>(g.mean[2]));
-    const Quat rotation =
-        anchor_from_view.rotation * Quat(static_cast<double>(g.rotation[0]), static_cast<double>(g.rotation[1]),
-                                         static_cast<double>(g.rotation[2]), static_cast<double>(g.rotation[3]));
-    for (int i = 0; i < 3; ++i) g.mean[i] = static_cast<float>(mean[i]);
-    g.rotation[0] = static_cast<float>(rotation.w());
-    for (int i = 0; i < 3; ++i) g.rotation[i + 1] = static_cast<float>(rotation.vec()[i]);
-  }
+  const ShRotation rotation(anchor_from_view.matrix3());
+  for (splatting::Gaussian& g : seeds) g = transform(g, anchor_from_view, rotation);
   model_.add(static_cast<int>(index), seeds, 0, static_cast<uint32_t>(iteration_));
 }
 
