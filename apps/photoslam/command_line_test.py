@@ -60,6 +60,12 @@ class CommandLineTest(unittest.TestCase):
         shutil.copytree(SEQUENCE, copy)
         return copy
 
+    def run_deterministic(self, name, *options, sequence=SEQUENCE):
+        output = self.folder / name
+        result = photoslam("run", sequence, "--output", output, "--deterministic", *options)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return output
+
 
 class UsageTest(CommandLineTest):
     def test_every_command_has_help_with_examples(self):
@@ -238,12 +244,6 @@ class DamagedSequenceTest(CommandLineTest):
 
 
 class RunTest(CommandLineTest):
-    def run_deterministic(self, name, *options, sequence=SEQUENCE):
-        output = self.folder / name
-        result = photoslam("run", sequence, "--output", output, "--deterministic", *options)
-        self.assertEqual(result.returncode, 0, result.stderr)
-        return output
-
     def test_report_keeps_its_contract(self):
         output = self.run_deterministic("run")
         report = json.loads((output / "report.json").read_text(encoding="utf-8"))
@@ -327,6 +327,74 @@ class RunTest(CommandLineTest):
         process.wait()
         for name in ("map.ply", "trajectory.tum", "report.json"):
             self.assertFalse((self.output / name).exists(), name)
+
+
+
+class SessionTest(CommandLineTest):
+    """A session that is saved, loaded, continued, damaged and killed, through the program alone."""
+
+    def run_session(self, *options):
+        return self.run_deterministic("first", "--set", "pipeline.iterations_per_frame=1", *options)
+
+    def test_localize_only_finds_the_place_and_leaves_the_session(self):
+        first = self.run_session()
+        before = sha256(first / "session.photoslam")
+        second = self.run_deterministic("second", "--load-map", first, "--localize-only")
+        self.assertEqual(sha256(first / "session.photoslam"), before)
+        self.assertFalse((second / "session.photoslam").exists())
+        frames = json.loads((second / "report.json").read_text(encoding="utf-8"))["frames"]
+        self.assertEqual(frames["tracked"], frames["total"])
+        self.assertEqual((second / "map.ply").read_bytes(), (first / "map.ply").read_bytes())
+
+    def test_loaded_and_saved_again_has_the_same_bytes(self):
+        first = self.run_session()
+        second = self.run_deterministic("second", "--load-map", first / "session.photoslam", "--map-until", "0",
+                                        "--set", "pipeline.iterations_per_frame=0")
+        self.assertGreater((second / "session.photoslam").stat().st_size, 10000)
+        third = self.run_deterministic("third", "--load-map", second, "--map-until", "0", "--set",
+                                       "pipeline.iterations_per_frame=0")
+        self.assertEqual(sha256(second / "session.photoslam"), sha256(third / "session.photoslam"))
+
+    def test_a_loaded_map_grows(self):
+        first = self.run_session()
+        second = self.run_deterministic("second", "--load-map", first)
+        size = [len((run / "map.ply").read_bytes()) for run in (first, second)]
+        self.assertGreaterEqual(size[1], size[0])
+        self.assertTrue((second / "session.photoslam").is_file())
+
+    def test_damaged_sessions(self):
+        session = self.run_session() / "session.photoslam"
+        content = session.read_bytes()
+        middle = len(content) // 2
+        future = bytearray(content)
+        future[8:16] = (99).to_bytes(4, "little") + (0xFFFFFFFF - 99).to_bytes(4, "little")
+        damages = {
+            "truncated": content[:middle],
+            "damaged": content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1:],
+            "newer photoslam": bytes(future),
+            "not a session file": b"something else entirely, of some length",
+        }
+        for words, damaged in damages.items():
+            with self.subTest(words=words):
+                session.write_bytes(damaged)
+                result = photoslam("run", SEQUENCE, "--load-map", session, "--output", self.output)
+                self.assert_fails(result, 1, words, session)
+                self.assert_nothing_written()
+        self.assert_fails(photoslam("run", SEQUENCE, "--load-map", self.folder / "nowhere"), 1, "nowhere")
+        self.assert_fails(photoslam("run", SEQUENCE, "--localize-only"), 2, "--load-map")
+
+    def test_a_kill_while_saving_leaves_a_whole_session(self):
+        first = self.run_session()
+        output = self.folder / "again"
+        shutil.copytree(first, output)
+        command = [BINARY, "run", str(SEQUENCE), "--output", str(output), "--autosave", "0.001"]
+        for delay in (0.15, 0.3, 0.45, 0.6, 0.75, 0.9):
+            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            time.sleep(delay)
+            process.kill()
+            process.wait()
+            self.assertTrue((output / "session.photoslam").is_file())
+        self.run_deterministic("check", "--load-map", output, "--localize-only")
 
 
 if __name__ == "__main__":

@@ -26,6 +26,7 @@ struct SynthArguments {
   std::filesystem::path output;
   bool lossless = false;
   int threads = 0;
+  int shrink = 1;
   SyntheticOptions options;
 };
 
@@ -69,6 +70,7 @@ Status configure(SynthArguments& arguments, SequenceSettings& settings) {
   const auto sensor = parse_sensor(arguments.sensor);
   if (!sensor) return sensor.error();
   options.sensor = sensor->value_or(SensorKind::rgbd);
+  options.camera = shrink(options.camera, arguments.shrink);
   mount_lens(arguments.lens, options);
   if (arguments.format == "auto") arguments.format = options.sensor == SensorKind::stereo ? "euroc" : "tum";
   settings = {layouts().at(arguments.format), arguments.lossless};
@@ -130,6 +132,9 @@ void add_synth(CommandLine& line) {
   command.add_option("--output", a.output, "Folder for the sequence, new or empty")->required();
   command.add_option("--frames", o.num_frames, "Length; 300 are the first loop, 900 the whole tour")
       ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  command.add_option("--shrink", a.shrink, "Images smaller by this factor: 2 is 320x240")
+      ->check(CLI::Range(1, 8))
       ->capture_default_str();
   command.add_option("--fps", o.frames_per_second, "Rate of the camera [Hz]")
       ->check(CLI::Range(1.0, 240.0))
