@@ -64,6 +64,10 @@ Result<std::string> read_checked_file(const std::filesystem::path& path, const F
     return error("{} has format version {}, this program reads up to {}: use a newer photoslam", path.string(),
                  header.version, kind.version);
   }
+  if (header.version < kind.oldest) {
+    return error("{} has format version {}, this program reads {} and newer: use the photoslam that wrote it",
+                 path.string(), header.version, kind.oldest);
+  }
   const size_t size = file->size() - sizeof(header);
   if (size < header.size) {
     return error("{} is truncated: {} of {} bytes; use another copy", path.string(), size, header.size);

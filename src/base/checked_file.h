@@ -16,6 +16,7 @@ struct FileKind {
   std::string_view name;   ///< For messages: "session".
   std::string_view magic;  ///< Eight bytes.
   uint32_t version = 1;    ///< That this program writes, and the newest it reads.
+  uint32_t oldest = 1;     ///< That it still reads.
 };
 
 /// Writes header (magic, version, size, checksum) and content atomically: a crash at any moment leaves the file that

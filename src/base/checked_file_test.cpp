@@ -52,6 +52,9 @@ TEST_F(CheckedFile, SaysWhatIsWrong) {
             std::string::npos);
   ASSERT_TRUE(write_checked_file(path(), {"test", "TESTFILE", 4}, "from the future"));
   EXPECT_NE(read_checked_file(path(), kKind).error().message.find("newer"), std::string::npos);
+  FileKind newer = kKind;
+  newer.oldest = newer.version = 5;
+  EXPECT_NE(read_checked_file(path(), newer).error().message.find("the photoslam that wrote it"), std::string::npos);
   EXPECT_FALSE(read_checked_file(folder / "missing", kKind));
 }
 

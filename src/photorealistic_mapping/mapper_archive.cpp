@@ -1,18 +1,11 @@
 // Copyright the photoslam authors.
 // SPDX-License-Identifier: Apache-2.0
 #include "math/archive.h"
+#include "photorealistic_mapping/image_archive.h"
 #include "photorealistic_mapping/photorealistic_mapper.h"
 
 namespace photoslam {
 namespace {
-
-template <class T>
-void serialize_image(Archive& a, Image<T>& image) {
-  int width = image.width(), height = image.height(), channels = image.channels();
-  a(width, height, channels);
-  if (a.reading()) image = width > 0 ? Image<T>(width, height, channels) : Image<T>();
-  a.raw(image.values().data(), image.values().size_bytes());
-}
 
 /// The picture a target was made from.
 ImageU8 color_of(const splatting::TargetImage& target) {
@@ -51,7 +44,7 @@ void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
     view = &views_.back();
   }
   a(view->adjustment);
-  serialize_image(a, view->picture.depth);
+  if (depth.empty()) serialize_image(a, view->picture.depth);  // otherwise it follows from the depth image
   serialize_image(a, view->right);
 }
 

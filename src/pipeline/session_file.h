@@ -19,8 +19,8 @@ struct SessionHeader {
   void serialize(Archive& archive);
 };
 
-/// The file of a session: header, geometric map, photorealistic map, in one archive. Written atomically, so that the
-/// session before survives a crash at any moment.
+/// The file of a session: header, geometric map, photorealistic map, in one archive, compressed. Written atomically, so
+/// that the session before survives a crash at any moment.
 Status write_session(const std::filesystem::path& path, const Archive& session);
 
 /// The bytes of a session, checked; its folder may be given instead of the file.
