@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
+
+#include "math/median.h"
 
 namespace photoslam {
 namespace {
@@ -55,12 +58,23 @@ class CellCoverage {
   std::array<int, kColumns * kRows> expected_{}, found_{};
 };
 
-/// The keyframe, those that share landmarks with it, and theirs.
+/// Those that share landmarks with a keyframe, at least a quarter as many as the one that shares most: drift lets a few
+/// of an old place fit by chance, long before its loop is closed.
+std::vector<KeyframeId> neighbours(const MapSnapshot& map, KeyframeId id) {
+  std::vector<KeyframeId> result;
+  const auto& covisible = map.keyframe(id).covisible;
+  for (const auto& [keyframe, shared] : covisible) {
+    if (4 * shared >= covisible.front().shared_landmarks) result.push_back(keyframe);
+  }
+  return result;
+}
+
+/// The keyframe, its neighbours, and theirs.
 std::set<KeyframeId> connected(const MapSnapshot& map, KeyframeId id) {
   std::set<KeyframeId> result{id};
-  for (const auto& first : map.keyframe(id).covisible) {
-    result.insert(first.keyframe);
-    for (const auto& second : map.keyframe(first.keyframe).covisible) result.insert(second.keyframe);
+  for (const KeyframeId first : neighbours(map, id)) {
+    result.insert(first);
+    for (const KeyframeId second : neighbours(map, first)) result.insert(second);
   }
   return result;
 }
@@ -82,6 +96,8 @@ void LoopDetectorOptions::visit(OptionVisitor& v) {
            "looks like another one does not look so all around it."},
           min_coverage);
   v.value({"search_radius_px", "px", 0.5, 100.0, "Search radius around a predicted landmark."}, search_radius_px);
+  v.value({"min_shift_px", "px", 0.0, 1000.0, "Landmarks that are less away from where the loop wants them need none."},
+          min_shift_px);
   v.value({"neighbourhood", "", 0, 1000, "Keyframes whose landmarks make up a place."}, neighbourhood);
   v.value({"confirming_keyframes", "", 0, 100, "Keyframes next to the new one that are asked for confirmation …"},
           confirming_keyframes);
@@ -111,7 +127,7 @@ LoopDetector::LoopDetector(const LoopDetectorOptions& options, const OrbOptions&
 std::optional<Loop> LoopDetector::detect(const MapSnapshot& map, KeyframeId now) {
   for (const PlaceCandidate& candidate : similar_places(map, map.keyframe(now).keyframe)) {
     auto loop = verify(map, KeyframeId(candidate.place), now);
-    if (loop && confirm(map, *loop)) return loop;
+    if (loop && !is_met(map, *loop) && confirm(map, *loop)) return loop;
   }
   return std::nullopt;
 }
@@ -228,6 +244,23 @@ std::optional<Loop> LoopDetector::verify(const MapSnapshot& map, KeyframeId then
   }
   const bool enough = static_cast<int>(loop.matches.size()) >= options_.min_guided_matches;
   return enough && is_same_place(seen) ? std::optional(loop) : std::nullopt;
+}
+
+/// Whether the map has the landmarks already where the loop wants them in the image.
+bool LoopDetector::is_met(const MapSnapshot& map, const Loop& loop) const {
+  const SE3& then_from_world = map.keyframe(loop.then).keyframe.camera_from_world;
+  const SE3& now_from_world = map.keyframe(loop.now).keyframe.camera_from_world;
+  std::vector<double> shifts;  // [px]
+  for (auto [id, keypoint] : loop.matches) {
+    const LandmarkView* landmark = map.find(id);
+    if (landmark == nullptr) continue;
+    const Vec3 is = now_from_world * landmark->position;
+    const Vec3 wanted = loop.now_from_then * (then_from_world * landmark->position);
+    const bool in_front = is.z() > 0 && wanted.z() > 0;
+    shifts.push_back(in_front ? (camera_.project(is) - camera_.project(wanted)).norm()
+                              : std::numeric_limits<double>::infinity());
+  }
+  return shifts.empty() || lower_median(shifts) < options_.min_shift_px;
 }
 
 bool LoopDetector::confirm(const MapSnapshot& map, const Loop& loop) {

@@ -23,6 +23,7 @@ struct LoopDetectorOptions {
   double min_matched_share = 0.25;
   double min_coverage = 0.5;
   double search_radius_px = 6.0;
+  double min_shift_px = 3.0;
   int neighbourhood = 10;
   int confirming_keyframes = 5;
   int min_confirmations = 2;
@@ -65,6 +66,7 @@ class LoopDetector {
   Search search(const MapSnapshot& map, std::span<const LandmarkId> landmarks, const SE3& camera_from_world,
                 const Keyframe& keyframe, double radius_px);
   bool is_same_place(const Search& search) const;
+  bool is_met(const MapSnapshot& map, const Loop& loop) const;
   bool confirm(const MapSnapshot& map, const Loop& loop);
   std::optional<Vec3> point_in_camera(const MapSnapshot& map, const Keyframe& keyframe, size_t keypoint) const;
 
