@@ -2,7 +2,8 @@
 # Copyright the photoslam authors.
 # SPDX-License-Identifier: Apache-2.0
 #
-# Compiles the splatting formulas as device code, where there is an nvcc; says so and stops without an error elsewhere.
+# Compiles and links the kernels of src/splatting/cuda for the oldest GPU they support and a new one, where there is an
+# nvcc; says so and stops without an error elsewhere. Prints a table of what each kernel takes, and fails if one spills.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -13,31 +14,36 @@ nvcc=$(command -v nvcc || true)
 }
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
-cat >"$scratch/formulas.cu" <<'CUDA'
-#include "splatting/formulas.h"
+architectures=${PHOTOSLAM_CUDA_ARCHITECTURES:-"75 90"}
+for architecture in $architectures; do
+  "$nvcc" -std=c++20 -Werror all-warnings -Isrc -arch="sm_$architecture" -Xptxas -v -shared -Xcompiler -fPIC \
+    src/splatting/cuda/kernels.cu -o "$scratch/kernels_$architecture.so" >"$scratch/ptxas_$architecture.log" 2>&1 || {
+    cat "$scratch/ptxas_$architecture.log"
+    exit 1
+  }
+done
+python3 - "$scratch" $architectures <<'PYTHON'
+import re
+import sys
 
-namespace s = photoslam::splatting::scalar;
-using photoslam::splatting::AnchorView;
-
-// One gaussian per thread, forwards and backwards; `values` and `out` are large enough.
-__global__ void all_formulas(AnchorView view, const float* values, float* out) {
-  const float* v = values + 64 * threadIdx.x;
-  s::Projection<float> g;
-  s::project(view, v, v + 3, v + 7, g);
-  float direction[3], basis[16], by_direction[3], by_offset[3];
-  const float inverse = s::normalize(g.offset, direction);
-  s::sh_basis(3, direction, basis);
-  s::sh_basis_backward(3, direction, v + 10, by_direction);
-  s::normalize_backward(direction, inverse, by_direction, by_offset);
-  s::ScreenGradient<float> screen{v[26], v[27], v[28], v[29], v[30], v[31]};
-  s::GeometryGradient<float> gradient;
-  s::project_backward(view, g, screen, by_offset, gradient);
-  float* o = out + 64 * threadIdx.x;
-  for (int i = 0; i < 16; ++i) o[i] = basis[i];
-  for (int i = 0; i < 3; ++i) o[16 + i] = gradient.mean[i] + gradient.log_scale[i];
-  for (int i = 0; i < 4; ++i) o[19 + i] = gradient.rotation[i];
-  for (int i = 0; i < 6; ++i) o[23 + i] = gradient.pose[i];
-}
-CUDA
-"$nvcc" -std=c++20 -Werror all-warnings -Isrc -c "$scratch/formulas.cu" -o "$scratch/formulas.o"
-echo "check_device_code: the formulas compile with $("$nvcc" --version | sed -n 's/.*release \([0-9.]*\).*/nvcc \1/p')"
+folder, architectures = sys.argv[1], sys.argv[2:]
+used = {}
+for architecture in architectures:
+    log = open(f"{folder}/ptxas_{architecture}.log", encoding="utf-8").read()
+    for entry in log.split("Compiling entry function")[1:]:
+        name = re.search(r"run_kernelINS\w*?_\d+([A-Z][A-Za-z]+?)EEEv", entry)[1]
+        shared = re.search(r"(\d+) bytes smem", entry)
+        used.setdefault(name, {})[architecture] = (
+            int(re.search(r"Used (\d+) registers", entry)[1]),
+            int(shared[1]) if shared else 0,
+            int(re.search(r"(\d+) bytes stack frame", entry)[1]),
+            sum(map(int, re.findall(r"(\d+) bytes spill", entry))),
+        )
+print("| kernel |" + "".join(f" sm_{a}: registers | shared B | stack B | spilled B |" for a in architectures))
+print("|---|" + "---|" * (4 * len(architectures)))
+for name, rows in sorted(used.items()):
+    print(f"| {name} |" + "".join(f" {value} |" for a in architectures for value in rows[a]))
+if any(row[3] for rows in used.values() for row in rows.values()):
+    sys.exit("check_device_code: a kernel spills registers")
+PYTHON
+echo "check_device_code: the kernels compile and link with $("$nvcc" --version | sed -n 's/.*release \([0-9.]*\).*/nvcc \1/p')"

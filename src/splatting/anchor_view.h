@@ -4,6 +4,9 @@
 
 namespace photoslam::splatting {
 
+struct Camera;
+struct Pose;
+
 /// A camera as seen from one anchor. The centre is split in two floats, so that subtracting it from a mean is exact to
 /// fp32 of the difference, however far from the anchor's origin both are.
 struct AnchorView {
@@ -14,5 +17,8 @@ struct AnchorView {
   float min_x, max_x, min_y, max_y;  ///< Clamp of x/z and y/z in the Jacobian.
   float near;
 };
+
+/// `near`: gaussians at this depth or before it are not drawn [m]. Nothing is, through intrinsics that are not numbers.
+AnchorView make_anchor_view(const Pose& camera_from_anchor, const Camera& camera, float near);
 
 }  // namespace photoslam::splatting

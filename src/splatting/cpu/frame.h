@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "splatting/anchor_view.h"
+#include "splatting/blending.h"
 #include "splatting/cpu/buffer.h"
 #include "splatting/model.h"
 #include "splatting/view.h"
@@ -18,11 +19,6 @@ inline constexpr int kCellSize = 4;  ///< 4x4 pixels: the unit that is skipped o
 inline constexpr int kCellPixels = kCellSize * kCellSize;
 inline constexpr int kCellsPerRow = kTileSize / kCellSize;  ///< 8x8 cells: one bit each in a 64-bit mask.
 inline constexpr int kBlocksPerTask = 8;                    ///< Gaussian blocks projected or updated by one task.
-
-/// Blending weights below 1/255 do not count; −log2(1/255).
-inline constexpr float kLog2Cut = 7.9943534368588578f;
-inline constexpr float kMaxAlpha = 0.99f;
-inline constexpr float kMinTransmittance = 1e-4f;
 
 /// A projected gaussian: one cache line. With t = dx − slope dy, (dx, dy) = pixel − (u, v):
 /// log2(alpha) = log2_opacity + ka t² + kc dy².

@@ -1,0 +1,200 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Runs kernels on the host, for tests: every thread of a block is a fiber, switched at barriers and warp collectives.
+
+#include <ucontext.h>
+
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "base/check.h"
+#include "splatting/cuda/group.h"
+
+namespace photoslam::splatting::cuda {
+
+/// One block of threads. Blocks run one after the other, threads of a block interleave at collectives only.
+class HostBlock {
+ public:
+  HostBlock(int num_blocks, int threads)
+      : num_blocks_(num_blocks),
+        fibers_(static_cast<size_t>(threads)),
+        gates_(static_cast<size_t>(1 + threads / kWarpSize)) {
+    PHOTOSLAM_CHECK(threads > 0 && threads % kWarpSize == 0, "{} threads are no whole warps", threads);
+    for (Fiber& fiber : fibers_) fiber.stack = std::make_unique_for_overwrite<char[]>(kStackSize);
+  }
+
+  /// Calls body(thread) in a fiber each, as block `block`; ends when all have returned. A collective that some thread
+  /// of its warp or block never reaches would hang a GPU: here it is an error.
+  template <class Body>
+  void run(int block, Body&& body) {
+    block_ = block;
+    using Plain = std::remove_reference_t<Body>;
+    invoke_ = [](void* self, int thread) { (*static_cast<Plain*>(self))(thread); };
+    body_ = &body;
+    for (Fiber& fiber : fibers_) {
+      fiber.done = false;
+      fiber.gate = nullptr;
+      getcontext(&fiber.context);
+      fiber.context.uc_stack.ss_sp = fiber.stack.get();
+      fiber.context.uc_stack.ss_size = kStackSize;
+      fiber.context.uc_link = &main_;
+      makecontext(&fiber.context, reinterpret_cast<void (*)()>(&HostBlock::enter), 0);
+    }
+    current_block() = this;
+    size_t finished = 0;
+    while (finished < fibers_.size()) {
+      bool progress = false;
+      for (current_ = 0; current_ < fibers_.size(); ++current_) {
+        Fiber& fiber = fibers_[current_];
+        if (fiber.done || (fiber.gate != nullptr && fiber.gate->generation == fiber.generation)) continue;
+        fiber.gate = nullptr;
+        progress = true;
+        swapcontext(&main_, &fiber.context);
+        finished += fiber.done ? 1 : 0;
+      }
+      PHOTOSLAM_CHECK(progress, "block {}: {} of {} threads returned, the others wait for them", block_, finished,
+                      fibers_.size());
+    }
+  }
+
+  int block() const { return block_; }
+  int num_blocks() const { return num_blocks_; }
+
+  struct Gate {
+    uint32_t generation = 0;
+    uint32_t arrived = 0;
+    std::vector<char> values[2];  ///< [members, kSlot], by parity of the generation.
+  };
+  static constexpr size_t kSlot = 64;
+
+  Gate& block_gate() { return gates_[0]; }
+  Gate& warp_gate(int warp) { return gates_[static_cast<size_t>(1 + warp)]; }
+
+  /// Publishes a value and waits for all members of the gate; returns what they published.
+  const char* exchange(Gate& gate, size_t member, size_t members, const void* value, size_t size) {
+    std::vector<char>& values = gate.values[gate.generation % 2];
+    values.resize(members * kSlot);
+    std::memcpy(values.data() + member * kSlot, value, size);
+    if (++gate.arrived == members) {
+      gate.arrived = 0;
+      ++gate.generation;
+      return values.data();
+    }
+    Fiber& fiber = fibers_[current_];
+    fiber.gate = &gate;
+    fiber.generation = gate.generation;
+    swapcontext(&fiber.context, &main_);
+    return values.data();
+  }
+
+ private:
+  static constexpr size_t kStackSize = size_t{64} * 1024;
+
+  struct Fiber {
+    ucontext_t context{};
+    std::unique_ptr<char[]> stack;
+    const Gate* gate = nullptr;  ///< What it waits for: that the generation is over.
+    uint32_t generation = 0;
+    bool done = false;
+  };
+
+  static HostBlock*& current_block() {
+    static thread_local HostBlock* block = nullptr;
+    return block;
+  }
+  static void enter() {
+    HostBlock& self = *current_block();
+    const size_t thread = self.current_;
+    self.invoke_(self.body_, static_cast<int>(thread));
+    self.fibers_[thread].done = true;
+  }
+
+  int block_ = 0;
+  int num_blocks_;
+  std::vector<Fiber> fibers_;
+  std::vector<Gate> gates_;
+  ucontext_t main_{};
+  size_t current_ = 0;
+  void* body_ = nullptr;
+  void (*invoke_)(void*, int) = nullptr;
+};
+
+/// DeviceGroup's counterpart.
+class HostGroup {
+ public:
+  HostGroup(HostBlock& block, int thread, int threads) : block_(block), thread_(thread), threads_(threads) {}
+  int thread() const { return thread_; }
+  int block() const { return block_.block(); }
+  int num_blocks() const { return block_.num_blocks(); }
+  int lane() const { return thread_ % kWarpSize; }
+  int warp() const { return thread_ / kWarpSize; }
+  void sync() { in_block(0); }
+  bool sync_any(bool predicate) {
+    const char* all = in_block(predicate ? 1 : 0);
+    for (size_t i = 0; i < static_cast<size_t>(threads_); ++i)
+      if (all[i * HostBlock::kSlot] != 0) return true;
+    return false;
+  }
+  void sync_warp() { in_warp(0); }
+  uint32_t ballot(bool predicate) {
+    const uint32_t own = predicate ? 1 : 0;
+    const char* all = in_warp(own);
+    uint32_t mask = 0;
+    for (int i = 0; i < kWarpSize; ++i) mask |= value_of<uint32_t>(all, i) << i;
+    return mask;
+  }
+  uint32_t match(uint32_t value) {
+    const char* all = in_warp(value);
+    uint32_t mask = 0;
+    for (int i = 0; i < kWarpSize; ++i) mask |= static_cast<uint32_t>(value_of<uint32_t>(all, i) == value) << i;
+    return mask;
+  }
+  template <class T>
+  T from_previous(const T& value) {
+    const char* all = in_warp(value);
+    return value_of<T>(all, lane() == 0 ? 0 : lane() - 1);
+  }
+  uint32_t add(uint32_t* sum, uint32_t value) {
+    const uint32_t before = *sum;
+    *sum += value;
+    return before;
+  }
+
+ private:
+  const char* in_block(char value) {
+    return block_.exchange(block_.block_gate(), static_cast<size_t>(thread_), static_cast<size_t>(threads_), &value, 1);
+  }
+  template <class T>
+  const char* in_warp(const T& value) {
+    static_assert(sizeof(T) <= HostBlock::kSlot);
+    return block_.exchange(block_.warp_gate(warp()), static_cast<size_t>(lane()), kWarpSize, &value, sizeof(T));
+  }
+  template <class T>
+  static T value_of(const char* all, int lane) {
+    T value;
+    std::memcpy(&value, all + static_cast<size_t>(lane) * HostBlock::kSlot, sizeof(T));
+    return value;
+  }
+
+  HostBlock& block_;
+  int thread_, threads_;
+};
+
+/// Runs a kernel as a GPU would with <<<num_blocks, Kernel::kThreads>>>. Shared memory starts with garbage.
+template <class Kernel>
+void run_on_host(int num_blocks, const Kernel& kernel) {
+  auto shared = std::make_unique<typename Kernel::Shared>();
+  HostBlock block(num_blocks, Kernel::kThreads);
+  for (int i = 0; i < num_blocks; ++i) {
+    std::memset(static_cast<void*>(shared.get()), 0xff, sizeof(typename Kernel::Shared));
+    block.run(i, [&](int thread) {
+      HostGroup group(block, thread, Kernel::kThreads);
+      kernel(group, *shared);
+    });
+  }
+}
+
+}  // namespace photoslam::splatting::cuda
