@@ -45,7 +45,7 @@ def module_problems(module):
         for bracket, name in includes(path):
             target = name.split("/")[0]
             where = f"{path.relative_to(ROOT)}: includes {name}"
-            if target in QUOTED_LIBRARIES:
+            if target in QUOTED_LIBRARIES or (bracket == "<" and "/" not in name):  # <map> is the standard library's
                 continue
             if target == "photoslam":
                 if module != "api":

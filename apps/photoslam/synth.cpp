@@ -1,6 +1,7 @@
 // Copyright the photoslam authors.
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,18 +13,20 @@
 #include "commands.h"
 #include "interrupt.h"
 #include "sources/sensor_choice.h"
+#include "sources/synthetic/mesh_world.h"
 #include "sources/synthetic/sequence_writer.h"
-#include "sources/synthetic/world.h"
 
 namespace photoslam {
 namespace {
+
+constexpr int kDefaultFrames = 300;
 
 struct SynthArguments {
   std::string scene = "room";
   std::string sensor = "rgbd";
   std::string format = "auto";
   std::string lens = "none";
-  std::filesystem::path output;
+  std::filesystem::path output, trajectory;
   bool lossless = false;
   int threads = 0;
   int shrink = 1;
@@ -56,6 +59,11 @@ const std::map<std::string, SequenceLayout>& layouts() {
   return kLayouts;
 }
 
+bool is_world_name(const std::string& scene) {
+  const auto worlds = synthetic_worlds();
+  return std::ranges::any_of(worlds, [&](const WorldInfo& world) { return world.name == scene; });
+}
+
 /// A lens as cameras of this kind have it.
 void mount_lens(const std::string& lens, SyntheticOptions& options) {
   if (lens == "radial") options.distortion = {-0.28, 0.074, 0.0002, -0.0003};
@@ -80,6 +88,24 @@ Status configure(SynthArguments& arguments, SequenceSettings& settings) {
   return check_sequence_folder(arguments.output);
 }
 
+/// The world to film: one of ours by its name, or a user's mesh with a walk of its own.
+Result<std::shared_ptr<const SyntheticWorld>> build_world(SynthArguments& arguments, Executor& executor) {
+  SyntheticOptions& options = arguments.options;
+  if (is_world_name(arguments.scene)) {
+    if (options.num_frames == 0) options.num_frames = kDefaultFrames;
+    return make_world(arguments.scene, static_cast<uint64_t>(options.seed), executor);
+  }
+  auto mesh = open_mesh_world(arguments.scene, arguments.trajectory, executor);
+  if (!mesh) return mesh.error();
+  const int whole = static_cast<int>(mesh->seconds * options.frames_per_second) + 1;
+  if (options.num_frames == 0) options.num_frames = whole;
+  if (options.num_frames > whole) {
+    return error("--frames {}: {} has poses for {} frames at {} Hz", options.num_frames, arguments.trajectory.string(),
+                 whole, options.frames_per_second);
+  }
+  return mesh->world;
+}
+
 Status synthesize(SynthArguments arguments) {
   SequenceSettings settings;
   if (Status status = configure(arguments, settings); !status) return status;
@@ -87,13 +113,14 @@ Status synthesize(SynthArguments arguments) {
   const Stopwatch total;
   const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   ThreadPool executor(arguments.threads > 0 ? arguments.threads : cores);
-  fmt::print(stderr, "building the {}\n", arguments.scene);
-  const auto world = make_world(arguments.scene, static_cast<uint64_t>(arguments.options.seed), executor);
+  fmt::print(stderr, "building {}\n", arguments.scene);
+  const auto world = build_world(arguments, executor);
+  if (!world) return world.error();
   fmt::print(stderr, "filming {} frames into {}\n", arguments.options.num_frames, arguments.output.string());
 
   FrameCounter counter(arguments.options.num_frames);
   const auto summary = write_sequence(
-      SyntheticCamera(world, arguments.options), settings, arguments.output, executor,
+      SyntheticCamera(*world, arguments.options), settings, arguments.output, executor,
       [&](int done) { counter.show(done); }, interrupt.token());
   if (!summary) return summary.error();
   fmt::print("{} frames in {:.1f} s: {}\n", summary->frames, total.seconds(), arguments.output.string());
@@ -104,6 +131,22 @@ Status synthesize(SynthArguments arguments) {
   return {};
 }
 
+/// A world's name, or a mesh with a walk.
+void check_scene(const SynthArguments& arguments) {
+  if (is_world_name(arguments.scene)) {
+    if (!arguments.trajectory.empty())
+      throw CLI::ValidationError("--trajectory", "needs a mesh: the built-in worlds have walks of their own");
+    return;
+  }
+  std::vector<std::string> names;
+  for (const WorldInfo& world : synthetic_worlds()) names.push_back(world.name);
+  if (!std::filesystem::is_regular_file(arguments.scene))
+    throw CLI::ValidationError(
+        "scene", fmt::format("'{}' is neither a mesh file nor one of {}", arguments.scene, fmt::join(names, ", ")));
+  if (arguments.trajectory.empty())
+    throw CLI::ValidationError("--trajectory", "is missing: a mesh needs a walk, a TUM file of camera poses");
+}
+
 }  // namespace
 
 void add_synth(CommandLine& line) {
@@ -112,17 +155,17 @@ void add_synth(CommandLine& line) {
                                "  photoslam synth room --output room\n"
                                "  photoslam synth room --frames 900 --format replica --output room900\n"
                                "  photoslam synth room --sensor stereo --lens radial --output room_stereo\n"
-                               "  photoslam synth room --noise 0 --depth-noise 0 --depth-holes 0 --output clean\n");
+                               "  photoslam synth room --noise 0 --depth-noise 0 --depth-holes 0 --output clean\n"
+                               "  photoslam synth scan.ply --trajectory walk.txt --output scan_walk\n");
   SynthArguments& a = *arguments;
   SyntheticOptions& o = a.options;
-  std::vector<std::string> names;
   std::string scenes = "What to film:";
-  for (const WorldInfo& world : synthetic_worlds()) {
-    names.push_back(world.name);
-    scenes +=
-        fmt::format(" {} ({}){}", world.name, world.description, names.size() < synthetic_worlds().size() ? "," : "");
-  }
-  command.add_option("scene", a.scene, scenes)->required()->check(CLI::IsMember(names));
+  for (const WorldInfo& world : synthetic_worlds()) scenes += fmt::format(" {} ({}),", world.name, world.description);
+  scenes += " or a mesh of yours (.ply or .obj, with colours at its vertices or in images)";
+  command.add_option("scene", a.scene, scenes)->required();
+  command
+      .add_option("--trajectory", a.trajectory, "Walk through the mesh: poses of the camera in its frame (TUM file)")
+      ->check(CLI::ExistingFile);
   command.add_option("--sensor", a.sensor, "Sensor of the camera")
       ->check(CLI::IsMember({"rgbd", "stereo", "mono"}))
       ->capture_default_str();
@@ -130,9 +173,14 @@ void add_synth(CommandLine& line) {
       ->check(CLI::IsMember({"auto", "tum", "replica", "euroc", "kitti"}))
       ->capture_default_str();
   command.add_option("--output", a.output, "Folder for the sequence, new or empty")->required();
-  command.add_option("--frames", o.num_frames, "Length; 300 are the first loop, 900 the whole tour")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
+  o.num_frames = 0;
+  command
+      .add_option(
+          "--frames", o.num_frames,
+          fmt::format("Length; in the room 300 are the first loop and 900 the whole tour. Without it {}, or the "
+                      "whole walk through a mesh",
+                      kDefaultFrames))
+      ->check(CLI::Range(1, 1000000));
   command.add_option("--shrink", a.shrink, "Images smaller by this factor: 2 is 320x240")
       ->check(CLI::Range(1, 8))
       ->capture_default_str();
@@ -178,6 +226,7 @@ void add_synth(CommandLine& line) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   line.on_run(command, [arguments] {
+    check_scene(*arguments);
     if (arguments->lossless && arguments->format == "replica")
       throw CLI::ValidationError("--lossless", "needs another format: Replica's colour images are JPEG");
     if (arguments->format == "replica" && arguments->options.frames_per_second != 30)

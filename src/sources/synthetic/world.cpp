@@ -130,8 +130,9 @@ Color SyntheticWorld::State::shade(const RayTracer::Hits& hits, int ray, const V
   const float across = hits.distance[k] / focal;
   const float footprint = std::max(0.8f * across, std::min(0.4f * across / cosine, 2 * across));
   const Vec2f place = hit.patch.texture_place(hit.uv);
-  const Color albedo = model.textures[static_cast<size_t>(hit.material.texture)].sample(
-      place.x(), place.y(), footprint * hit.patch.texture_metres);
+  const Color albedo = hit.tint * model.textures[static_cast<size_t>(hit.material.texture)].sample(
+                                      place.x(), place.y(), footprint * hit.patch.texture_metres);
+  if (model.baked) return albedo / kExposure;
   const Color incoming = light.sample(hit.patch, hit.uv);
   Color out = albedo * (incoming + hit.material.emission);
   const float gloss = hit.material.gloss * albedo[3];

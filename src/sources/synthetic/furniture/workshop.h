@@ -27,6 +27,7 @@ struct SceneModel {
   Lights lights;
   Texture backdrop;  ///< What the window shows: fills the rectangle below.
   Vec3f backdrop_corner{0, 0, 0}, backdrop_right{0, 0, 0}, backdrop_down{0, 0, 0};
+  bool baked = false;  ///< The textures show the surfaces as they are lit: no light is computed.
 };
 
 /// Where furniture is made: shapes, materials and chance. Textures are painted at the end, all together.

@@ -41,8 +41,12 @@ Mesh::Hit Mesh::hit(int32_t triangle, float second, float third) const {
   const Vertex &a = vertices[t.vertices[0]], &b = vertices[t.vertices[1]], &c = vertices[t.vertices[2]];
   const float first = 1 - second - third;
   const Patch& patch = patches[t.patch];
+  const Color tint =
+      tints.empty()
+          ? Color::Ones()
+          : Color(first * tints[t.vertices[0]] + second * tints[t.vertices[1]] + third * tints[t.vertices[2]]);
   return {patch, materials[static_cast<size_t>(patch.material)], first * a.uv + second * b.uv + third * c.uv,
-          (first * a.normal + second * b.normal + third * c.normal).normalized()};
+          (first * a.normal + second * b.normal + third * c.normal).normalized(), tint};
 }
 
 }  // namespace photoslam::synthetic

@@ -57,6 +57,7 @@ struct Triangle {
 
 struct Mesh {
   std::vector<Vertex> vertices;
+  std::vector<Color> tints;  ///< Linear colour per vertex that multiplies the texture; empty: white.
   std::vector<Triangle> triangles;
   std::vector<Patch> patches;
   std::vector<Material> materials;
@@ -75,6 +76,7 @@ struct Mesh {
     const Material& material;
     Vec2f uv;
     Vec3f normal;  ///< Of unit length, pointing outwards.
+    Color tint;    ///< Multiplies the texture.
   };
   /// The point of a triangle with the given weights of its second and third vertex.
   Hit hit(int32_t triangle, float second, float third) const;

@@ -27,9 +27,10 @@ uint64_t spread(uint32_t texel) {
   return (halves | halves << 8) & 0x00FF00FF00FF00FFu;
 }
 
-/// Index into `size` texels continued by mirroring.
-int mirrored(int i, int size) {
+/// Index into `size` texels continued by repetition or by mirroring.
+int continued(int i, int size, bool repeats) {
   if (static_cast<unsigned>(i) < static_cast<unsigned>(size)) return i;
+  if (repeats) return ((i % size) + size) % size;
   i %= 2 * size;
   if (i < 0) i += 2 * size;
   return i < size ? i : 2 * size - 1 - i;
@@ -59,10 +60,30 @@ Texture Texture::paint(float width, float height, float texels_per_metre, const 
     }
   });
   texture.levels_.push_back(std::move(base));
-  while (std::min(texture.levels_.back().width, texture.levels_.back().height) > 1) {
-    texture.levels_.push_back(shrink(texture.levels_.back()));
-  }
+  texture.add_smaller_levels();
   return texture;
+}
+
+Texture Texture::from_image(const ImageU8& image, Executor& executor) {
+  PHOTOSLAM_CHECK(!image.empty(), "an empty image");
+  const auto width = static_cast<float>(image.width());
+  Texture texture = paint(
+      1, static_cast<float>(image.height()) / width, width,
+      [&](float x, float y) -> Color {
+        const int column = std::min(static_cast<int>(x * width), image.width() - 1);
+        const int row = std::min(static_cast<int>(y * width), image.height() - 1);
+        const auto value = [&](int channel) {
+          return static_cast<float>(image(column, row, std::min(channel, image.channels() - 1))) / 255.0f;
+        };
+        return {value(0), value(1), value(2), 1};
+      },
+      executor);
+  texture.repeats_ = true;
+  return texture;
+}
+
+void Texture::add_smaller_levels() {
+  while (std::min(levels_.back().width, levels_.back().height) > 1) levels_.push_back(shrink(levels_.back()));
 }
 
 Texture::Level Texture::shrink(const Level& level) {
@@ -86,12 +107,14 @@ Texture::Level Texture::shrink(const Level& level) {
   return half;
 }
 
-Color Texture::bilinear(const Level& level, float x, float y) {
+Color Texture::bilinear(const Level& level, float x, float y) const {
   const float tx = x * static_cast<float>(level.width) - 0.5f, ty = y * static_cast<float>(level.height) - 0.5f;
   const int ix = floor_int(tx), iy = floor_int(ty);
-  const int x0 = mirrored(ix, level.width), x1 = mirrored(ix + 1, level.width);
-  const uint32_t* row0 = level.texels.data() + static_cast<ptrdiff_t>(mirrored(iy, level.height)) * level.width;
-  const uint32_t* row1 = level.texels.data() + static_cast<ptrdiff_t>(mirrored(iy + 1, level.height)) * level.width;
+  const int x0 = continued(ix, level.width, repeats_), x1 = continued(ix + 1, level.width, repeats_);
+  const uint32_t* row0 =
+      level.texels.data() + static_cast<ptrdiff_t>(continued(iy, level.height, repeats_)) * level.width;
+  const uint32_t* row1 =
+      level.texels.data() + static_cast<ptrdiff_t>(continued(iy + 1, level.height, repeats_)) * level.width;
   // Four 16-bit sums side by side in one integer; the weights add up to 256, so nothing overflows.
   const uint32_t fx = static_cast<uint32_t>((tx - static_cast<float>(ix)) * 16 + 0.5f);
   const uint32_t fy = static_cast<uint32_t>((ty - static_cast<float>(iy)) * 16 + 0.5f);
