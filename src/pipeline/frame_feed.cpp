@@ -16,12 +16,16 @@ FrameFeed::FrameFeed(FrameSource& source, Pace pace, size_t capacity, bool threa
       failures_(failures),
       queue_(capacity, pace == Pace::realtime ? Overflow::drop_oldest : Overflow::block),
       threaded_(threaded) {
-  if (threaded_) thread_ = std::thread([this] { read_all(); });
+  if (!threaded_) return;
+  reader_ = std::thread([this] { read_all(); });
+  if (pace_ == Pace::realtime) releaser_ = std::thread([this] { release_all(); });
 }
 
 FrameFeed::~FrameFeed() {
+  early_.close();
   queue_.close();
-  if (thread_.joinable()) thread_.join();
+  if (reader_.joinable()) reader_.join();
+  if (releaser_.joinable()) releaser_.join();
 }
 
 std::optional<FedFrame> FrameFeed::next() {
@@ -49,30 +53,49 @@ void FrameFeed::wait_until(SteadyTime due) {
 
 void FrameFeed::read_all() {
   try {
-    SteadyTime start;
-    std::optional<int64_t> first_ns;
     while (!stop_.stop_requested()) {
       std::optional<Frame> frame = source_.next();
       if (!frame) break;
-      SteadyTime due = steady_clock::now();
-      if (pace_ == Pace::realtime) {
-        if (!first_ns) {
-          first_ns = frame->timestamp_ns;
-          start = due;
-        }
-        due = start + std::chrono::nanoseconds(frame->timestamp_ns - *first_ns);
-        wait_until(due);
-      }
-      {
-        std::lock_guard lock(mutex_);
-        timestamps_[frame->id] = frame->timestamp_ns;
-      }
-      if (!queue_.push({std::move(*frame), due, steady_clock::now()})) break;
+      const auto now = steady_clock::now();
+      const bool taken =
+          pace_ == Pace::realtime ? early_.push({std::move(*frame), now}) : release(std::move(*frame), now);
+      if (!taken) break;
     }
   } catch (const std::exception& e) {
-    failures_.report("input", e.what());
+    failure_ = e.what();
   }
+  early_.close();
+  if (pace_ != Pace::realtime) finish();
+}
+
+void FrameFeed::release_all() {
+  std::optional<SteadyTime> start;
+  int64_t first_ns = 0;
+  while (std::optional<ReadFrame> read = early_.pop()) {
+    if (!start) {
+      start = read->when;
+      first_ns = read->frame.timestamp_ns;
+    }
+    const SteadyTime due = *start + std::chrono::nanoseconds(read->frame.timestamp_ns - first_ns);
+    wait_until(due);
+    if (stop_.stop_requested()) break;
+    if (!release(std::move(read->frame), due)) break;
+  }
+  early_.close();
+  finish();
+}
+
+void FrameFeed::finish() {
+  if (!failure_.empty()) failures_.report("input", failure_);
   queue_.close();
+}
+
+bool FrameFeed::release(Frame frame, SteadyTime due) {
+  {
+    std::lock_guard lock(mutex_);
+    timestamps_[frame.id] = frame.timestamp_ns;
+  }
+  return queue_.push({std::move(frame), due, steady_clock::now()});
 }
 
 }  // namespace photoslam

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <optional>
 #include <stop_token>
+#include <string>
 #include <thread>
 
 #include "base/bounded_queue.h"
@@ -26,9 +27,12 @@ struct FedFrame {
 };
 
 /// Reads a source on its own thread and releases the frames at the chosen pace. At real-time pace a full queue drops
-/// its oldest frame, else the reader waits.
+/// its oldest frame, else the reader waits. Then a second thread releases, so that the reader can be kReadAhead frames
+/// early and a slow disk delays nothing.
 class FrameFeed {
  public:
+  static constexpr size_t kReadAhead = 10;
+
   /// Without a thread, next() reads; that is for single-threaded runs, which have no pace.
   FrameFeed(FrameSource& source, Pace pace, size_t capacity, bool threaded, std::stop_token stop,
             FailureReport& failures);
@@ -41,18 +45,28 @@ class FrameFeed {
   int64_t timestamp_ns(FrameId frame) const;
 
  private:
+  struct ReadFrame {
+    Frame frame;
+    SteadyTime when;
+  };
+
   void read_all();
+  void release_all();
+  bool release(Frame frame, SteadyTime due);
+  void finish();
   void wait_until(SteadyTime due);
 
   FrameSource& source_;
   Pace pace_;
   std::stop_token stop_;
   FailureReport& failures_;
+  BoundedQueue<ReadFrame> early_{kReadAhead, Overflow::block};  ///< Frames whose time has not come.
+  std::string failure_;  ///< Why reading ended early; told when the frames before have been released.
   BoundedQueue<FedFrame> queue_;
   bool threaded_;
   mutable std::mutex mutex_;
   std::map<FrameId, int64_t> timestamps_;
-  std::thread thread_;
+  std::thread reader_, releaser_;
 };
 
 }  // namespace photoslam

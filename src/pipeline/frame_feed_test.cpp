@@ -89,6 +89,29 @@ TEST_F(FrameFeedTest, RealTimeKeepsTheNewestForAReaderThatStalls) {
   EXPECT_EQ(feed.timestamp_ns(FrameId(5)), 1'000'005'000'000) << "dropped frames keep their timestamps";
 }
 
+/// One frame takes long to read.
+class SlowDisk : public EmptyFrames {
+ public:
+  SlowDisk() : EmptyFrames(12, 40) {}
+  std::optional<Frame> next() override {
+    if (num_read == 8) std::this_thread::sleep_for(milliseconds(150));
+    return EmptyFrames::next();
+  }
+};
+
+TEST_F(FrameFeedTest, AFrameThatTakesLongToReadIsReadAheadOfItsTime) {
+  SlowDisk source;
+  FrameFeed feed(source, Pace::realtime, 3, true, stop_.get_token(), failures_);
+  int released = 0;
+  while (const auto fed = feed.next()) {
+    if (released == 4) {
+      EXPECT_GE(source.num_read, 8) << "the first eight are read at once";
+    }
+    ++released;
+  }
+  EXPECT_EQ(released, 12);
+}
+
 TEST_F(FrameFeedTest, StopEndsTheWaitForALateFrame) {
   EmptyFrames source(2, 3'600'000);
   FrameFeed feed(source, Pace::realtime, 3, true, stop_.get_token(), failures_);
