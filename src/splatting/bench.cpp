@@ -23,7 +23,8 @@ namespace photoslam::splatting::HWY_NAMESPACE {
 double fma_kernel(int count, float* out) {
   Vec sums[12];
   for (Vec& sum : sums) sum = hn::Set(kFloats, 1.0f);
-  const Vec a = hn::Set(kFloats, 0.999f), b = hn::Set(kFloats, 0.001f);
+  const volatile float factor = 0.999f, offset = 0.001f;  // or a compiler may see that the sums stay 1
+  const Vec a = hn::Set(kFloats, factor), b = hn::Set(kFloats, offset);
   for (int i = 0; i < count; ++i)
     for (Vec& sum : sums) sum = hn::MulAdd(sum, a, b);
   Vec total = hn::Zero(kFloats);
