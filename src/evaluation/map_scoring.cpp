@@ -6,6 +6,7 @@
 
 #include "base/clock.h"
 #include "image/convert.h"
+#include "photorealistic_mapping/exposure_adjustment.h"
 #include "photorealistic_mapping/view_geometry.h"
 #include "pipeline/frame_rectifier.h"
 
@@ -18,6 +19,7 @@ struct Job {
   FrameId frame;
   int64_t timestamp_ns = 0;
   SE3 camera_from_world;
+  splatting::Exposure exposure;
   const ImageU8* truth = nullptr;
   bool keep_pair = false;
   // Results.
@@ -38,6 +40,7 @@ struct Worker {
     const Stopwatch clock;
     renderer.render(*task.gaussians, {to_splatting(camera), camera_from_anchor}, {}, serial, result);
     job.render_ms = clock.milliseconds();
+    apply(job.exposure, result);
     const ImageF image = to_image(result);
     job.score = score_frame(job.frame, job.timestamp_ns, image, *job.truth, mask);
     if (job.keep_pair) job.render = to_u8(image);
@@ -88,6 +91,7 @@ std::vector<MapScores> score_maps(FrameSource& source, std::span<const ScoringTa
                       .frame = frame->id,
                       .timestamp_ns = frame->timestamp_ns,
                       .camera_from_world = *poses[id],
+                      .exposure = tasks[task].exposures.empty() ? splatting::Exposure{} : tasks[task].exposures[id],
                       .truth = &images.back(),
                       .keep_pair = keep,
                       .score = {},

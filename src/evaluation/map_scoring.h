@@ -18,6 +18,7 @@ struct ScoringTask {
   const splatting::GaussianModel* gaussians = nullptr;
   std::span<const SE3> anchors_from_world;            // [anchors of gaussians]
   std::vector<std::optional<SE3>> camera_from_world;  ///< [frames of the source] by FrameId; nothing: not scored.
+  std::vector<splatting::Exposure> exposures = {};    ///< The same; empty: all are identity.
 };
 
 struct MapScores {
@@ -27,8 +28,8 @@ struct MapScores {
 };
 
 /// Renders every frame of the source at its pose, in the undistorted camera, and compares: masked where there is no
-/// data, clamped to [0, 1], never fitted to the image. The source is read once for all tasks; frames that it cannot
-/// deliver are left out. `pair_frames` are those whose pictures are kept.
+/// data, clamped to [0, 1], with the exposure that the task tells, never fitted to the image. The source is read once
+/// for all tasks; frames that it cannot deliver are left out. `pair_frames` are those whose pictures are kept.
 std::vector<MapScores> score_maps(FrameSource& source, std::span<const ScoringTask> tasks,
                                   std::span<const FrameId> pair_frames, Executor& executor);
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <ranges>
 
 #include "base/file.h"
 #include "evaluation/html/figure_tables.h"
@@ -99,12 +100,14 @@ class Page {
   }
 
   void add_curves() {
-    const html::TimePlot plots[] = {image_plot(), error_plot(), tracking_plot()};
+    const html::TimePlot plots[] = {image_plot(), error_plot(), tracking_plot(), refinement_plot()};
     if (std::ranges::all_of(plots, [](const auto& plot) { return plot.points.empty(); })) return;
     add("<h2>Over time</h2>\n");
     add_curve("Likeness of the render, PSNR per frame.", plots[0]);
     add_curve("Distance between estimated and true position after alignment.", plots[1]);
     add_curve("Time to track a frame. Red marks are frames without a pose.", plots[2]);
+    add_curve("Likeness of the trained views while the map was refined after the input; running mean of PSNR.",
+              plots[3]);
   }
 
   void add_curve(const char* caption, const html::TimePlot& plot) {
@@ -164,6 +167,20 @@ class Page {
     plot.high = 1.1 * std::min(std::ranges::max(times), 2 * percentile(times, 0.99));
     plot.level = percentile(times, 0.5);
     plot.level_label = fmt::format("median {:.1f}", *plot.level);
+    return plot;
+  }
+
+  html::TimePlot refinement_plot() const {
+    html::TimePlot plot = empty_plot("image", "dB");
+    plot.points = content_.refinement;
+    if (plot.points.empty()) return plot;
+    const auto [low, high] =
+        std::ranges::minmax(plot.points | std::views::transform([](const Vec2& p) { return p.y(); }));
+    plot.low = std::max(0.0, std::floor(low - 1));
+    plot.high = std::ceil(high + 1);
+    plot.end_s = std::max(plot.points.back().x(), 1e-3);
+    plot.level = plot.points.back().y();
+    plot.level_label = fmt::format("end {:.2f}", *plot.level);
     return plot;
   }
 

@@ -28,11 +28,12 @@ struct HtmlReport {
   Trajectory truth;
   FrameLog frames;
   std::vector<FrameScore> scores;  ///< By time.
+  std::vector<Vec2> refinement;    ///< Seconds of refinement, PSNR of the training views [dB].
   std::vector<ImagePair> pairs;
 };
 
 /// One self-contained file: figures, both trajectories from above (truth green, estimate red), render and truth side by
-/// side, curves of PSNR and tracking time. Needs neither network nor scripts. Written atomically.
+/// side, curves of PSNR, tracking time and refinement. Needs neither network nor scripts. Written atomically.
 Status write_html_report(const std::filesystem::path& path, const HtmlReport& content);
 
 }  // namespace photoslam

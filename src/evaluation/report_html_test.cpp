@@ -80,6 +80,16 @@ TEST_F(HtmlReportTest, ShowsFiguresCurvesAndPairs) {
   EXPECT_EQ(count(page, "class=\"mark\""), 1u) << "one frame without a pose";
 }
 
+TEST_F(HtmlReportTest, ShowsHowRefinementImprovesTheMap) {
+  HtmlReport content = small_run();
+  for (int i = 1; i <= 40; ++i) content.refinement.emplace_back(0.25 * i, 30 - 5.0 / i);
+  const std::string page = write_and_read(content);
+  EXPECT_EQ(count(page, "<svg class=\"plot\""), 4u);
+  EXPECT_THAT(page, HasSubstr("while the map was refined"));
+  EXPECT_THAT(page, HasSubstr("end 29.88"));
+  EXPECT_THAT(page, HasSubstr(">10</text>")) << "the axis ends with the refinement, not with the input";
+}
+
 TEST_F(HtmlReportTest, IsWellFormed) {
   const std::string page = write_and_read(small_run());
   std::vector<std::string> open;

@@ -3,6 +3,7 @@
 #include "evaluation/run_evaluation.h"
 
 #include <algorithm>
+#include <map>
 #include <set>
 #include <thread>
 
@@ -24,12 +25,38 @@ std::string describe_machine() {
   return fmt::format("{} cores, {}", std::thread::hardware_concurrency(), build_description());
 }
 
+/// Which keyframe was made at which time.
+std::map<int64_t, KeyframeId> keyframe_times(const RunOutcome& run) {
+  std::map<int64_t, KeyframeId> times;
+  for (const FrameOutcome& frame : run.frames) {
+    if (frame.keyframe.valid()) times[frame.timestamp_ns] = frame.keyframe;
+  }
+  return times;
+}
+
+/// The exposure of the keyframe nearest in time.
+splatting::Exposure nearest_exposure(const std::map<int64_t, KeyframeId>& times, const FrozenMap& map, int64_t time) {
+  if (times.empty()) return {};
+  auto nearest = times.lower_bound(time);
+  if (nearest == times.end() ||
+      (nearest != times.begin() && time - std::prev(nearest)->first < nearest->first - time)) {
+    --nearest;
+  }
+  const auto index = static_cast<size_t>(nearest->second.value);
+  return index < map.keyframe_exposures.size() ? map.keyframe_exposures[index] : splatting::Exposure{};
+}
+
 ScoringTask scoring_task(const RunOutcome& run, const FrozenMap& map) {
   ScoringTask task{&map.gaussians, map.anchors_from_world, {}};
+  const auto times = keyframe_times(run);
   for (const FrameOutcome& frame : run.frames) {
     const auto id = static_cast<size_t>(frame.frame.value);
-    if (id >= task.camera_from_world.size()) task.camera_from_world.resize(id + 1);
+    if (id >= task.camera_from_world.size()) {
+      task.camera_from_world.resize(id + 1);
+      task.exposures.resize(id + 1);
+    }
     task.camera_from_world[id] = camera_from_world(frame, map);
+    task.exposures[id] = nearest_exposure(times, map, frame.timestamp_ns);
   }
   return task;
 }
@@ -155,6 +182,9 @@ HtmlReport evaluate_run(const RunOutcome& run, const SystemOptions& options, Fra
   html.report.config.all = config_values(used);
   html.report.config.changed = changed_values(used, defaults);
 
+  for (const RefinementPoint& point : run.refinement) {
+    html.refinement.emplace_back(point.seconds, point.training_psnr_db);
+  }
   html.estimate = final_trajectory(run);
   if (truth) {
     evaluate_trajectories(final_trajectory(run), online_trajectory(run), *truth,

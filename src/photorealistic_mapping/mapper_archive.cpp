@@ -28,6 +28,11 @@ ImageU16 depth_of(const splatting::TargetImage& target) {
 
 void PoseAdjustment::serialize(Archive& a) { a(correction_, first_moment_, second_moment_, steps_); }
 
+void ExposureAdjustment::serialize(Archive& a) {
+  for (size_t i = 0; i < parameters_.size(); ++i) a(parameters_[i], first_moment_[i], second_moment_[i]);
+  a(steps_);
+}
+
 void KeyframeSchedule::serialize(Archive& a) { a(random_, uses_, round_); }
 
 void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
@@ -43,7 +48,7 @@ void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
     add_view(color, depth);
     view = &views_.back();
   }
-  a(view->adjustment);
+  a(view->adjustment, view->exposure);
   if (depth.empty()) serialize_image(a, view->picture.depth);  // otherwise it follows from the depth image
   serialize_image(a, view->right);
 }

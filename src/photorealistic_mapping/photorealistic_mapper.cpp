@@ -59,6 +59,7 @@ void PhotorealisticOptions::visit(OptionVisitor& v) {
   v.group("rates", "Step sizes of Adam.", rates);
   v.group("densification", "Split, clone and prune.", densification);
   v.group("poses", "Photometric refinement of keyframe poses.", poses);
+  v.group("exposure", "Brightness of each keyframe's picture.", exposure);
 }
 
 PhotorealisticMapper::PhotorealisticMapper(const PhotorealisticOptions& options, MapperSensor sensor, uint64_t seed)
@@ -98,6 +99,7 @@ void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, c
   update_poses(map);
 
   add_view(images.color, images.depth);
+  if (views_.size() > 1) views_.back().exposure.start_from(views_[views_.size() - 2].exposure);
   if (!images.right.empty()) views_.back().right = shrink_color(images.right, kSeedingFactor);
   const size_t index = views_.size() - 1;
   // A single camera's first keyframe has none before it to compare with: it gets its depth from the second.
@@ -163,12 +165,23 @@ splatting::RenderOptions PhotorealisticMapper::render_options() const {
   return render;
 }
 
+/// The map as the view's small picture shows it, before any exposure.
+void PhotorealisticMapper::render_picture(size_t index, Executor& executor) {
+  camera_from_anchors(view_from_world(index), anchors_from_world_, camera_from_anchor_);
+  const splatting::Camera camera = to_splatting(views_[index].picture.camera);
+  renderer_.render(model_, {camera, camera_from_anchor_}, render_options(), executor, render_);
+}
+
 void PhotorealisticMapper::seed(size_t index, int cell, double min_color_error, std::span<const DepthPixel> features,
                                 Executor& executor) {
-  const TrainingView& view = views_[index];
+  TrainingView& view = views_[index];
   const DepthPicture& picture = view.picture;
-  camera_from_anchors(view_from_world(index), anchors_from_world_, camera_from_anchor_);
-  renderer_.render(model_, {to_splatting(picture.camera), camera_from_anchor_}, render_options(), executor, render_);
+  render_picture(index, executor);
+  if (options_.exposure.enabled && index > 0 && schedule_.uses(static_cast<int>(index)) == 0) {
+    view.exposure.match(picture.color, render_);
+  }
+  const splatting::Exposure exposure = view.exposure.exposure();
+  if (options_.exposure.enabled) apply(exposure, render_);
   auto seeds = seed_cells(options_.seeding, picture, render_, std::max(1, cell / kSeedingFactor), min_color_error);
   const auto at_features = seed_features(options_.seeding, picture, kSeedingFactor, render_, features);
   seeds.insert(seeds.end(), at_features.begin(), at_features.end());
@@ -177,7 +190,10 @@ void PhotorealisticMapper::seed(size_t index, int cell, double min_color_error, 
   // Seeds are made in the frame of the adjusted view; the anchor is the geometric keyframe.
   const SE3 anchor_from_view = view.adjustment.correction().inverse();
   const ShRotation rotation(anchor_from_view.matrix3());
-  for (splatting::Gaussian& g : seeds) g = transform(g, anchor_from_view, rotation);
+  for (splatting::Gaussian& g : seeds) {
+    if (options_.exposure.enabled) remove(exposure, g);
+    g = transform(g, anchor_from_view, rotation);
+  }
   model_.add(static_cast<int>(index), seeds, 0, static_cast<uint32_t>(iteration_));
 }
 
@@ -212,15 +228,17 @@ splatting::StepResult PhotorealisticMapper::train(std::optional<double> progress
   const auto index = static_cast<size_t>(choice.view);
   const auto level = static_cast<size_t>(choice.level);
   TrainingView& view = views_[index];
-  const splatting::TrainOptions options = train_options(progress);
+  splatting::TrainOptions options = train_options(progress);
+  options.exposure = view.exposure.exposure();
   camera_from_anchors(view_from_world(index), anchors_from_world_, camera_from_anchor_);
   const splatting::StepResult result = trainer_.step(model_, {to_splatting(view.cameras[level]), camera_from_anchor_},
                                                      view.targets[level], options, executor);
 
-  // The first keyframe defines the world and stays.
-  if (options_.poses.enabled && choice.view > 0) {
+  // The first keyframe defines the world, and what is bright in it.
+  if (choice.view > 0) {
     const double decay = progress ? std::pow(options_.rates.final_factor, *progress) : 1.0;
-    view.adjustment.step(options_.poses, scene_depth_, decay, result.pose_gradient);
+    if (options_.poses.enabled) view.adjustment.step(options_.poses, scene_depth_, decay, result.pose_gradient);
+    if (options_.exposure.enabled) view.exposure.step(options_.exposure, decay, result.exposure_gradient);
   }
   const double psnr = -10.0 * std::log10(std::max(static_cast<double>(result.mse), 1e-10));
   constexpr double kMemory = 0.98;
@@ -246,10 +264,9 @@ void PhotorealisticMapper::maintain(std::optional<double> progress, Executor& ex
 
 KeyframeComparison PhotorealisticMapper::compare_newest(Executor& executor) {
   PHOTOSLAM_CHECK(has_keyframes(), "no keyframe yet");
-  const DepthPicture& picture = views_.back().picture;
-  camera_from_anchors(view_from_world(views_.size() - 1), anchors_from_world_, camera_from_anchor_);
-  renderer_.render(model_, {to_splatting(picture.camera), camera_from_anchor_}, render_options(), executor, render_);
-  return {to_rgb(picture.color), to_u8(to_image(render_))};
+  render_picture(views_.size() - 1, executor);
+  apply(views_.back().exposure.exposure(), render_);
+  return {to_rgb(views_.back().picture.color), to_u8(to_image(render_))};
 }
 
 FrozenMap PhotorealisticMapper::freeze() const {
@@ -261,6 +278,7 @@ FrozenMap PhotorealisticMapper::freeze() const {
   model_.for_each([&](size_t i) { of_anchor[static_cast<size_t>(model_.anchor(i))].push_back(model_.get(i)); });
   for (size_t i = 0; i < views_.size(); ++i) {
     frozen.keyframes_from_world.push_back(view_from_world(i));
+    frozen.keyframe_exposures.push_back(views_[i].exposure.exposure());
     frozen.gaussians.add(frozen.gaussians.add_anchor(), of_anchor[i]);
   }
   return frozen;

@@ -11,6 +11,7 @@
 #include "image/pyramid.h"
 #include "map/snapshot.h"
 #include "photorealistic_mapping/densification.h"
+#include "photorealistic_mapping/exposure_adjustment.h"
 #include "photorealistic_mapping/feature_depth.h"
 #include "photorealistic_mapping/keyframe_depth.h"
 #include "photorealistic_mapping/keyframe_schedule.h"
@@ -48,6 +49,7 @@ struct PhotorealisticOptions {
   LearningRateOptions rates;
   DensificationOptions densification;
   PoseAdjustmentOptions poses;
+  ExposureOptions exposure;
   void visit(OptionVisitor& visitor);
 };
 
@@ -65,6 +67,7 @@ struct FrozenMap {
   std::vector<SE3> anchors_from_world;    ///< [K] geometric keyframe poses: frames of the gaussians.
   std::vector<SE3> keyframes_from_world;  ///< [K] camera_from_world, photometrically adjusted: what trajectories use.
   std::vector<double> keyframe_scales;    ///< [K] Keyframe::scale
+  std::vector<splatting::Exposure> keyframe_exposures;  ///< [K] What makes renders as bright as the pictures.
 };
 
 /// A picture and the render of the same view, both RGB.
@@ -111,7 +114,8 @@ class PhotorealisticMapper {
  private:
   /// A keyframe as training material.
   struct TrainingView {
-    PoseAdjustment adjustment;           // photometric correction of the keyframe's pose
+    PoseAdjustment adjustment;  // photometric correction of the keyframe's pose
+    ExposureAdjustment exposure;
     std::vector<PinholeCamera> cameras;  // [levels + 1]
     std::vector<splatting::TargetImage> targets;
     DepthPicture picture;  // half the size, for seeding
@@ -127,6 +131,7 @@ class PhotorealisticMapper {
   void seed_keyframe(const MapSnapshot& map, size_t view, Executor& executor);
   void sweep_picture(const MapSnapshot& map, size_t view, Executor& executor);
   void seed(size_t view, int cell, double min_color_error, std::span<const DepthPixel> features, Executor& executor);
+  void render_picture(size_t view, Executor& executor);
   void maintain(std::optional<double> progress, Executor& executor);
 
   PhotorealisticOptions options_;

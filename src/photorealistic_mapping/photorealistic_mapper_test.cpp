@@ -64,9 +64,10 @@ class WallWithKeyframes {
 
 class PhotorealisticMapperTest : public ::testing::Test {
  protected:
-  void add(PhotorealisticMapper& mapper, const SE3& pose, KeyframeImages images) {
+  void add(PhotorealisticMapper& mapper, const SE3& pose, KeyframeImages images, double gain = 1.0) {
     world_.add(pose);
     images.color = to_rgb(world_.picture(pose));
+    for (uint8_t& v : images.color.values()) v = static_cast<uint8_t>(std::lround(std::min(255.0, gain * v)));
     mapper.add_keyframe(*world_.snapshot(), KeyframeId(count_++), images, executor_);
   }
   /// Share of the gaussians within `tolerance` of the wall's depth, seen from the first keyframe.
@@ -119,6 +120,30 @@ TEST_F(PhotorealisticMapperTest, TrainingImprovesTheRender) {
   for (int i = 0; i < 150; ++i) last = mapper.train({}, executor_);
   EXPECT_LT(last.mse, 0.5f * first.mse);
   EXPECT_EQ(mapper.num_iterations(), 151);
+}
+
+TEST_F(PhotorealisticMapperTest, ExposureIsToldFromColor) {
+  const std::vector<double> gains = {0.8, 0.95, 0.7, 0.85, 0.65};
+  double psnr[2];
+  for (const bool enabled : {false, true}) {
+    PhotorealisticOptions options;
+    options.exposure.enabled = enabled;
+    PhotorealisticMapper mapper(options, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
+    world_ = {};
+    count_ = 0;
+    for (size_t i = 0; i < gains.size(); ++i) {
+      const SE3 pose = at(0.15 * static_cast<double>(i));
+      add(mapper, pose, stereo(pose), gains[i]);
+    }
+    for (int i = 0; i < 300; ++i) mapper.train({}, executor_);
+    psnr[enabled] = mapper.training_psnr();
+    const auto exposures = mapper.freeze().keyframe_exposures;
+    for (size_t i = 0; i < gains.size(); ++i) {
+      const double expected = enabled ? gains[i] / gains[0] : 1.0;
+      EXPECT_NEAR(static_cast<double>(exposures[i].gain[1]), expected, enabled && i > 0 ? 0.04 : 0.0) << i;
+    }
+  }
+  EXPECT_GT(psnr[1], psnr[0] + 3);
 }
 
 TEST_F(PhotorealisticMapperTest, GaussiansFollowTheirKeyframe) {

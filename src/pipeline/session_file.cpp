@@ -17,7 +17,7 @@
 namespace photoslam {
 namespace {
 
-constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 2, .oldest = 2};
+constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 3, .oldest = 3};
 
 /// Lets deflate or inflate work through the input; their counts have 32 bits.
 template <class Step>

@@ -1,0 +1,88 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "photorealistic_mapping/exposure_adjustment.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/check.h"
+
+namespace photoslam {
+
+void ExposureOptions::visit(OptionVisitor& v) {
+  v.value({"enabled", "", 0, 0, "Learn gain and bias of every keyframe; renders are scored with the nearest one's."},
+          enabled);
+  v.value({"gain_rate", "", 0.0, 1.0, "Step size of Adam for the logarithms of the gains."}, gain_rate);
+  v.value({"bias_rate", "", 0.0, 1.0, "Step size of Adam for the biases; 0: gains only."}, bias_rate);
+  v.value({"decay", "", 0.0, 1.0, "Share of log gains and biases that every step takes back, against drift."}, decay);
+}
+
+splatting::Exposure ExposureAdjustment::exposure() const {
+  splatting::Exposure exposure;
+  for (size_t c = 0; c < 3; ++c) {
+    exposure.gain[c] = static_cast<float>(std::exp(parameters_[c]));
+    exposure.bias[c] = static_cast<float>(parameters_[3 + c]);
+  }
+  return exposure;
+}
+
+void ExposureAdjustment::match(const ImageU8& picture, const splatting::RenderResult& render) {
+  constexpr float kOpaque = 0.8f;
+  constexpr int kDark = 5, kSaturated = 250;  // such pixels say nothing about brightness
+  constexpr double kMinShare = 0.2, kMaxLogGain = 1.4;
+  const size_t plane = render.alpha.size(), channels = static_cast<size_t>(picture.channels());
+  PHOTOSLAM_CHECK(picture.values().size() == channels * plane, "picture of {} values, render of {} pixels",
+                  picture.values().size(), plane);
+  const auto pixels = picture.values();
+  for (size_t c = 0; c < 3; ++c) {
+    double seen = 0, drawn = 0;
+    size_t count = 0;
+    for (size_t i = 0; i < plane; ++i) {
+      const int value = pixels[channels * i + (channels == 3 ? c : 0)];
+      if (render.alpha[i] < kOpaque || value < kDark || value > kSaturated) continue;
+      seen += static_cast<double>(render.alpha[i]) * value / 255.0;
+      drawn += static_cast<double>(render.rgb[c * plane + i]);
+      ++count;
+    }
+    if (static_cast<double>(count) < kMinShare * static_cast<double>(plane) || drawn <= 0) continue;
+    parameters_[c] = std::clamp(std::log(seen / drawn), -kMaxLogGain, kMaxLogGain);
+    parameters_[3 + c] = 0;
+  }
+}
+
+void ExposureAdjustment::step(const ExposureOptions& options, double rate_factor, std::span<const float, 6> gradient) {
+  constexpr double kBeta1 = 0.9, kBeta2 = 0.99, kEpsilon = 1e-12;
+  std::array<double, 6> g{};
+  for (size_t i = 0; i < 6; ++i) {
+    g[i] = static_cast<double>(gradient[i]) * (i < 3 ? std::exp(parameters_[i]) : 1.0);
+    if (!std::isfinite(g[i])) return;
+  }
+  ++steps_;
+  for (size_t i = 0; i < 6; ++i) {
+    first_moment_[i] = kBeta1 * first_moment_[i] + (1 - kBeta1) * g[i];
+    second_moment_[i] = kBeta2 * second_moment_[i] + (1 - kBeta2) * g[i] * g[i];
+    const double mean = first_moment_[i] / (1 - std::pow(kBeta1, steps_));
+    const double variance = second_moment_[i] / (1 - std::pow(kBeta2, steps_));
+    const double rate = i < 3 ? options.gain_rate : options.bias_rate;
+    parameters_[i] *= 1 - rate_factor * options.decay;
+    parameters_[i] -= rate_factor * rate * mean / (std::sqrt(variance) + kEpsilon);
+  }
+}
+
+void apply(const splatting::Exposure& exposure, splatting::RenderResult& render) {
+  const size_t plane = render.alpha.size();
+  for (size_t c = 0; c < 3; ++c) {
+    for (size_t i = c * plane; i < (c + 1) * plane; ++i)
+      render.rgb[i] = exposure.gain[c] * render.rgb[i] + exposure.bias[c];
+  }
+}
+
+void remove(const splatting::Exposure& exposure, splatting::Gaussian& gaussian) {
+  constexpr float kSh0 = 0.28209479177387814f;  // Y_0
+  for (size_t c = 0; c < 3; ++c) {
+    const float color = 0.5f + kSh0 * gaussian.sh[0][c];
+    gaussian.sh[0][c] = ((color - exposure.bias[c]) / exposure.gain[c] - 0.5f) / kSh0;
+  }
+}
+
+}  // namespace photoslam
