@@ -37,6 +37,7 @@ PHOTOSLAM_FORMULA float mul_add(float a, float b, float c) { return a * b + c; }
 PHOTOSLAM_FORMULA double mul_add(double a, double b, double c) { return a * b + c; }
 PHOTOSLAM_FORMULA float square_root(float a) { return sqrtf(a); }
 PHOTOSLAM_FORMULA double square_root(double a) { return sqrt(a); }
+PHOTOSLAM_FORMULA float reciprocal_root(float a) { return 1.0f / sqrtf(a); }
 PHOTOSLAM_FORMULA float exponential(float a) { return expf(a); }
 PHOTOSLAM_FORMULA double exponential(double a) { return exp(a); }
 PHOTOSLAM_FORMULA float logarithm2(float a) { return log2f(a); }
@@ -147,6 +148,29 @@ struct ScreenGradient {
   T exx, exy, eyy;  ///< Σ h e eᵀ with e = covariance⁻¹ (pixel − position), h = dL/d(exponent): 2 dL/d(covariance).
   T z;              ///< Depth.
 };
+
+/// What blending leaves of one gaussian: sums over pixels of h = dL/d(ln alpha) times powers of t = dx − slope dy and
+/// dy
+/// ((dx, dy) = pixel − screen position, slope = b/c), and of dL/d(depth).
+template <class T>
+struct PixelSums {
+  T t, dy, tt, t_dy, dy_dy, z;
+};
+
+/// With e = covariance⁻¹ (dx, dy): e.x = a1 t, e.y = c1 dy − slope a1 t where a1 = c/det, c1 = 1/c.
+template <class T>
+PHOTOSLAM_FORMULA ScreenGradient<T> screen_gradient(const Projection<T>& g, const PixelSums<T>& sums) {
+  const T c1 = T(1.0f) / g.c, a1 = g.c / g.det;
+  const T along = g.b * c1 * a1;  // slope a1
+  ScreenGradient<T> s;
+  s.u = a1 * sums.t;
+  s.v = c1 * sums.dy - along * sums.t;
+  s.exx = a1 * a1 * sums.tt;
+  s.exy = a1 * (c1 * sums.t_dy - along * sums.tt);
+  s.eyy = c1 * c1 * sums.dy_dy + along * (along * sums.tt - (c1 + c1) * sums.t_dy);
+  s.z = sums.z;
+  return s;
+}
 
 /// dL/d of the geometry of one gaussian, and its contribution to the pose.
 template <class T>
@@ -295,6 +319,33 @@ template <class T>
 PHOTOSLAM_FORMULA void normalize_backward(const T* unit, T inverse, const T* gradient, T* out) {
   const T radial = dot3(unit, gradient);
   for (int i = 0; i < 3; ++i) out[i] = inverse * (gradient[i] - unit[i] * radial);
+}
+
+// --- Optimiser -----------------------------------------------------------------------------------------------------
+
+/// 1 − exp(x) for x <= 0, accurate near zero.
+template <class T>
+PHOTOSLAM_FORMULA T one_minus_exp(T x) {
+  T series(1.0f / 40320.0f);
+  series = mul_add(series, x, T(1.0f / 5040.0f));
+  series = mul_add(series, x, T(1.0f / 720.0f));
+  series = mul_add(series, x, T(1.0f / 120.0f));
+  series = mul_add(series, x, T(1.0f / 24.0f));
+  series = mul_add(series, x, T(1.0f / 6.0f));
+  series = mul_add(series, x, T(0.5f));
+  series = mul_add(series, x, T(1.0f));
+  return select(x > T(-0.35f), -(series * x), T(1.0f) - exponential(x));
+}
+
+/// One step of Adam on one parameter: renews its moments and returns by how much it shrinks. `scale1` and `scale2`
+/// correct the bias: 1 / (1 − β^n), or 1.
+template <class T>
+PHOTOSLAM_FORMULA T adam_step(T gradient, T beta1, T beta2, T epsilon2, T scale1, T scale2, T rate, T& first,
+                              T& second) {
+  first = mul_add(beta1, first - gradient, gradient);
+  const T square = gradient * gradient;
+  second = mul_add(beta2, second - square, square);
+  return rate * scale1 * first * reciprocal_root(mul_add(second, scale2, epsilon2));
 }
 
 #ifdef HWY_NAMESPACE

@@ -8,6 +8,7 @@
 
 #include "base/check.h"
 #include "splatting/cpu/targets.h"
+#include "splatting/loss_constants.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "splatting/loss.cpp"
@@ -37,8 +38,8 @@ struct LossSums {
   double l1 = 0, ssim = 0, mse = 0, gain = 0, bias = 0;
 };
 
-inline constexpr int kWindow = 11;
-inline constexpr int kRadius = kWindow / 2;
+inline constexpr int kRadius = kSsimRadius;
+inline constexpr int kWindow = 2 * kRadius + 1;
 /// Zeros on either side of a row, and lanes to run over its end.
 inline constexpr size_t kPad = 16;
 inline constexpr int kSignals = 4;      ///< Filtered forwards: a, b, a² + b², a b.
@@ -57,11 +58,7 @@ constexpr size_t scratch_size(int width) {
 HWY_BEFORE_NAMESPACE();
 namespace photoslam::splatting::HWY_NAMESPACE {
 
-inline constexpr float kC1 = 0.01f * 0.01f, kC2 = 0.03f * 0.03f;
-
-/// exp(−k² / (2 1.5²)), normalised over the 11 taps; kTaps[k] belongs to distance k.
-inline constexpr float kTaps[kRadius + 1] = {0.26601172f, 0.21300554f, 0.10936069f,
-                                             0.03600077f, 0.00759876f, 0.00102838f};
+inline constexpr float kTaps[kRadius + 1] = {kSsimTap0, kSsimTap1, kSsimTap2, kSsimTap3, kSsimTap4, kSsimTap5};
 
 /// The compared values of row y: exposure applied, zero where there is no data. Writes [0, width) of both.
 void load_row(const LossBand& band, int y, float* HWY_RESTRICT a, float* HWY_RESTRICT b) {
@@ -109,7 +106,7 @@ struct Column {
 /// Returns the row's sum of SSIM.
 double compare_row(const LossBand& band, const Column* signals, int y, float* const* derivatives) {
   const size_t width = static_cast<size_t>(band.width);
-  const Vec c1 = hn::Set(kFloats, kC1), c2 = hn::Set(kFloats, kC2), two = hn::Set(kFloats, 2.0f);
+  const Vec c1 = hn::Set(kFloats, kSsimC1), c2 = hn::Set(kFloats, kSsimC2), two = hn::Set(kFloats, 2.0f);
   alignas(64) float mask[16];
   Vec total = hn::Zero(kFloats);
   for (size_t x = 0; x < width; x += kLanes) {

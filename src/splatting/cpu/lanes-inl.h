@@ -116,6 +116,8 @@ HWY_INLINE Vec reciprocal_sqrt(Vec x) {
   return r;
 }
 
+HWY_INLINE Lanes reciprocal_root(Lanes a) { return reciprocal_sqrt(a.v); }
+
 }  // namespace photoslam::splatting::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "splatting/cpu/targets.h"
+#include "splatting/update_constants.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "splatting/cpu/update.cpp"
@@ -26,14 +27,6 @@ namespace photoslam::splatting {
 struct UpdateTarget {
   Block* model = nullptr;
   float* dense = nullptr;  // [row::kCount, 64]
-};
-
-struct UpdateConstants {
-  float rates[row::kCount] = {};
-  float beta1 = 0, beta2 = 0, epsilon2 = 0;
-  float log_beta1 = 0, log_beta2 = 0;
-  bool bias_correction = false;
-  float opacity_gradient = 0;  ///< dL/d(opacity) of the regulariser.
 };
 
 }  // namespace photoslam::splatting
@@ -67,14 +60,6 @@ void gather_records(const Frame& frame, size_t rank, float (*rows)[kBlockSize]) 
     for (int i = 0; i < kRecordRows; ++i) rows[i][lane] = sums[i];
     rows[kMaxWeight][lane] = max_weight;
   }
-}
-
-/// 1 − exp(x) for x <= 0, accurate near zero.
-HWY_INLINE Lanes one_minus_exp(Lanes x) {
-  Lanes series(1.0f / 40320.0f);
-  for (const float c : {1.0f / 5040, 1.0f / 720, 1.0f / 120, 1.0f / 24, 1.0f / 6, 0.5f, 1.0f})
-    series = mul_add(series, x, Lanes(c));
-  return select(x > Lanes(-0.35f), -(series * x), Lanes(1.0f) - exponential(x));
 }
 
 /// Gradients of a block before anybody uses them. Those of the colour coefficients are products: basis ⊗ colour.
@@ -169,11 +154,9 @@ void adam_block(const BlockGradients& gradients, const UpdateConstants& constant
       float* second = block.second_moments[r] + lane;
       const Lanes gradient = gradients.at(r, lane);
       const Lanes m0 = load(first), v0 = load(second), p0 = load(parameter);
-      const Lanes m = mul_add(beta1, m0 - gradient, gradient);
-      const Lanes square = gradient * gradient;
-      const Lanes v = mul_add(beta2, v0 - square, square);
-      const Lanes denominator = reciprocal_sqrt(mul_add(v, load(scale2 + lane), epsilon2).v);
-      const Lanes step = rate * load(scale1 + lane) * m * denominator;
+      Lanes m = m0, v = v0;
+      const Lanes step =
+          adam_step(gradient, beta1, beta2, epsilon2, load(scale1 + lane), load(scale2 + lane), rate, m, v);
       store(select(mask, m, m0), first);
       store(select(mask, v, v0), second);
       store(select(mask, p0 - step, p0), parameter);
@@ -191,21 +174,9 @@ void write_dense(const BlockGradients& gradients, int degree, float* dense) {
                    dense + static_cast<size_t>(r) * kBlockSize + i * kLanes);
 }
 
-/// From the summed records to what project_backward() takes. With e = covariance⁻¹ (pixel − position):
-/// e.x = a1 t, e.y = c1 dy − slope a1 t where a1 = c/det, c1 = 1/c, slope = b/c.
-HWY_INLINE ScreenGradient<Lanes> screen_gradient(const Projection<Lanes>& g, const float (*rows)[kBlockSize],
-                                                 size_t lane) {
+HWY_INLINE PixelSums<Lanes> pixel_sums(const float (*rows)[kBlockSize], size_t lane) {
   const auto record = [&](int i) { return load(rows[i] + lane); };
-  const Lanes c1 = Lanes(1.0f) / g.c, a1 = g.c / g.det;
-  const Lanes along = g.b * c1 * a1;  // slope a1
-  ScreenGradient<Lanes> s;
-  s.u = a1 * record(kT);
-  s.v = c1 * record(kDy) - along * record(kT);
-  s.exx = a1 * a1 * record(kTT);
-  s.exy = a1 * (c1 * record(kTDy) - along * record(kTT));
-  s.eyy = c1 * c1 * record(kDyDy) + along * (along * record(kTT) - (c1 + c1) * record(kTDy));
-  s.z = record(kDepth);
-  return s;
+  return {record(kT), record(kDy), record(kTT), record(kTDy), record(kDyDy), record(kDepth)};
 }
 
 HWY_INLINE void update_statistics(Block& block, size_t lane, LaneMask mask, Lanes half_width, Lanes half_height,
@@ -250,7 +221,7 @@ void backward_block(const Frame& frame, size_t rank, const Block& block, const B
     for (int k = 0; k < 3; ++k) log_scale[k] = load(block.parameters[row::kLogScale + k] + lane);
     Projection<Lanes> g;
     project(view, mean, rotation, log_scale, g);
-    const ScreenGradient<Lanes> s = screen_gradient(g, rows, lane);
+    const ScreenGradient<Lanes> s = screen_gradient(g, pixel_sums(rows, lane));
     const Lanes color[3] = {load(rows[kRed] + lane), load(rows[kRed + 1] + lane), load(rows[kRed + 2] + lane)};
     const Lanes size = absolute(s.u) + absolute(s.v) + absolute(s.exx) + absolute(s.eyy) + absolute(s.exy) +
                        absolute(s.z) + absolute(color[0]) + absolute(color[1]) + absolute(color[2]);
@@ -267,7 +238,7 @@ void backward_block(const Frame& frame, size_t rank, const Block& block, const B
     for (int k = 0; k < 3; ++k) store(out.log_scale[k], gradients.geometry[row::kLogScale + k] + lane);
     const Lanes logit = load(block.parameters[row::kOpacity] + lane);
     const Lanes opacity = Lanes(1.0f) / (Lanes(1.0f) + exponential(minimum(-logit, Lanes(80.0f))));
-    const Lanes d_log_opacity = mul_add(opacity, Lanes(constants.opacity_gradient), load(rows[kOne] + lane));
+    const Lanes d_log_opacity = mul_add(opacity, Lanes(constants.opacity_weight), load(rows[kOne] + lane));
     store((Lanes(1.0f) - opacity) * d_log_opacity, gradients.geometry[row::kOpacity] + lane);
     for (int k = 0; k < 6; ++k) pose_sums[k] = pose_sums[k] + select(mask, out.pose[k], Lanes(0.0f));
   }
@@ -284,25 +255,6 @@ namespace photoslam::splatting {
 namespace {
 
 HWY_EXPORT(backward_block);
-
-UpdateConstants make_constants(const TrainOptions& options, int num_visible) {
-  UpdateConstants c;
-  const LearningRates& rates = options.rates;
-  std::fill_n(c.rates + row::kMean, 3, rates.mean);
-  std::fill_n(c.rates + row::kRotation, 4, rates.rotation);
-  std::fill_n(c.rates + row::kLogScale, 3, rates.log_scale);
-  c.rates[row::kOpacity] = rates.opacity;
-  std::fill_n(c.rates + row::kSh, 3, rates.sh_dc);
-  std::fill(c.rates + row::kSh + 3, c.rates + row::kCount, rates.sh_rest);
-  c.beta1 = options.beta1;
-  c.beta2 = options.beta2;
-  c.epsilon2 = std::max(options.epsilon * options.epsilon, 1e-36f);
-  c.log_beta1 = static_cast<float>(std::log(static_cast<double>(options.beta1)));
-  c.log_beta2 = static_cast<float>(std::log(static_cast<double>(options.beta2)));
-  c.bias_correction = options.bias_correction;
-  c.opacity_gradient = options.opacity_weight / static_cast<float>(std::max(num_visible, 1));
-  return c;
-}
 
 /// Runs the kernel over all visible blocks, and finish(block) after each; the pose is summed per task and then in the
 /// order of the tasks.
@@ -329,7 +281,8 @@ void run_backward(Executor& executor, Frame& frame, const GaussianModel& model, 
 }  // namespace
 
 void update_model(Executor& executor, Frame& frame, const TrainOptions& options, GaussianModel& model, float pose[6]) {
-  const UpdateConstants constants = make_constants(options, frame.num_visible);
+  UpdateConstants constants = make_update_constants(options);
+  constants.opacity_weight /= static_cast<float>(std::max(frame.num_visible, 1));
   run_backward(
       executor, frame, model, constants,
       [&](size_t b) { return UpdateTarget{options.update ? &model.block(b) : nullptr, nullptr}; },

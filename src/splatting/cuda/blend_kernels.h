@@ -109,6 +109,22 @@ struct alignas(16) SplatGradient {
   float weight, max_weight;
 };
 
+/// Instances in no tile are sorted behind all tiles; nobody blends them, so their gradient records are zero.
+struct ClearRecords {
+  static constexpr int kThreads = 256;
+  using Shared = NoShared;
+  const uint32_t* entries;
+  const uint32_t* end_of_tiles;
+  const uint32_t* size;
+  SplatGradient* records;
+  template <class Group>
+  PHOTOSLAM_DEVICE void operator()(Group& group, Shared&) const {
+    const uint32_t first = *end_of_tiles + static_cast<uint32_t>(group.block() * kThreads + group.thread());
+    for (uint32_t i = first; i < *size; i += static_cast<uint32_t>(group.num_blocks() * kThreads))
+      records[entries[i]] = SplatGradient{};
+  }
+};
+
 /// A pixel on its way through the lanes of a warp. `behind`: Σ over the splats to come of weight times (gradient ·
 /// value), the background included.
 struct TravellingPixel {

@@ -72,6 +72,9 @@ class DeviceGroup {
     memcpy(&result, words, sizeof(T));
     return result;
   }
+  /// The value of the lane whose number differs in the bits of the mask.
+  __device__ float exchange(float value, int mask) { return __shfl_xor_sync(kAll, value, mask); }
+  /// Returns the sum before.
   __device__ uint32_t add(uint32_t* sum, uint32_t value) { return atomicAdd(sum, value); }
 
  private:

@@ -4,6 +4,7 @@
 
 // Runs kernels on the host, for tests: every thread of a block is a fiber, switched at barriers and warp collectives.
 
+#include <setjmp.h>
 #include <ucontext.h>
 
 #include <cstring>
@@ -15,35 +16,30 @@
 
 namespace photoslam::splatting::cuda {
 
-/// One block of threads. Blocks run one after the other, threads of a block interleave at collectives only.
+/// One block of threads, for launch after launch. Blocks run one after the other, threads of a block interleave at
+/// collectives only.
 class HostBlock {
  public:
-  HostBlock(int num_blocks, int threads)
-      : num_blocks_(num_blocks),
-        fibers_(static_cast<size_t>(threads)),
-        gates_(static_cast<size_t>(1 + threads / kWarpSize)) {
+  explicit HostBlock(int threads)
+      : fibers_(static_cast<size_t>(threads)), gates_(static_cast<size_t>(1 + threads / kWarpSize)) {
     PHOTOSLAM_CHECK(threads > 0 && threads % kWarpSize == 0, "{} threads are no whole warps", threads);
     for (Fiber& fiber : fibers_) fiber.stack = std::make_unique_for_overwrite<char[]>(kStackSize);
   }
 
-  /// Calls body(thread) in a fiber each, as block `block`; ends when all have returned. A collective that some thread
-  /// of its warp or block never reaches would hang a GPU: here it is an error.
+  /// Calls body(thread) in a fiber each, as block `block` of `num_blocks`; ends when all have returned. A collective
+  /// that some thread of its warp or block never reaches would hang a GPU: here it is an error, after which this object
+  /// is of no more use.
   template <class Body>
-  void run(int block, Body&& body) {
+  void run(int block, int num_blocks, Body&& body) {
     block_ = block;
+    num_blocks_ = num_blocks;
     using Plain = std::remove_reference_t<Body>;
     invoke_ = [](void* self, int thread) { (*static_cast<Plain*>(self))(thread); };
     body_ = &body;
     for (Fiber& fiber : fibers_) {
       fiber.done = false;
       fiber.gate = nullptr;
-      getcontext(&fiber.context);
-      fiber.context.uc_stack.ss_sp = fiber.stack.get();
-      fiber.context.uc_stack.ss_size = kStackSize;
-      fiber.context.uc_link = &main_;
-      makecontext(&fiber.context, reinterpret_cast<void (*)()>(&HostBlock::enter), 0);
     }
-    current_block() = this;
     size_t finished = 0;
     while (finished < fibers_.size()) {
       bool progress = false;
@@ -52,7 +48,7 @@ class HostBlock {
         if (fiber.done || (fiber.gate != nullptr && fiber.gate->generation == fiber.generation)) continue;
         fiber.gate = nullptr;
         progress = true;
-        swapcontext(&main_, &fiber.context);
+        resume(fiber);
         finished += fiber.done ? 1 : 0;
       }
       PHOTOSLAM_CHECK(progress, "block {}: {} of {} threads returned, the others wait for them", block_, finished,
@@ -86,7 +82,7 @@ class HostBlock {
     Fiber& fiber = fibers_[current_];
     fiber.gate = &gate;
     fiber.generation = gate.generation;
-    swapcontext(&fiber.context, &main_);
+    suspend(fiber);
     return values.data();
   }
 
@@ -98,25 +94,42 @@ class HostBlock {
     std::unique_ptr<char[]> stack;
     const Gate* gate = nullptr;  ///< What it waits for: that the generation is over.
     uint32_t generation = 0;
-    bool done = false;
+    bool started = false, done = false;
+    jmp_buf place;  ///< Where it waits.
   };
 
-  static HostBlock*& current_block() {
-    static thread_local HostBlock* block = nullptr;
-    return block;
+  // A fiber is entered by its context once. From then on jumps switch: they leave the signal mask alone, which a change
+  // of context asks the kernel for every time.
+  void resume(Fiber& fiber) {
+    if (_setjmp(scheduler_) != 0) return;
+    if (fiber.started) _longjmp(fiber.place, 1);
+    fiber.started = true;
+    getcontext(&fiber.context);
+    fiber.context.uc_stack.ss_sp = fiber.stack.get();
+    fiber.context.uc_stack.ss_size = kStackSize;
+    fiber.context.uc_link = nullptr;
+    const auto self = reinterpret_cast<uintptr_t>(this);  // arguments are ints: in two halves
+    makecontext(&fiber.context, reinterpret_cast<void (*)()>(&HostBlock::enter), 2,
+                static_cast<unsigned>(uint64_t{self} >> 32), static_cast<unsigned>(self));
+    setcontext(&fiber.context);
   }
-  static void enter() {
-    HostBlock& self = *current_block();
+  void suspend(Fiber& fiber) {
+    if (_setjmp(fiber.place) == 0) _longjmp(scheduler_, 1);
+  }
+  static void enter(unsigned high, unsigned low) {
+    auto& self = *reinterpret_cast<HostBlock*>(static_cast<uintptr_t>((uint64_t{high} << 32) | low));
     const size_t thread = self.current_;
-    self.invoke_(self.body_, static_cast<int>(thread));
-    self.fibers_[thread].done = true;
+    while (true) {  // a body per block
+      self.invoke_(self.body_, static_cast<int>(thread));
+      self.fibers_[thread].done = true;
+      self.suspend(self.fibers_[thread]);
+    }
   }
 
-  int block_ = 0;
-  int num_blocks_;
+  int block_ = 0, num_blocks_ = 1;
   std::vector<Fiber> fibers_;
   std::vector<Gate> gates_;
-  ucontext_t main_{};
+  jmp_buf scheduler_;
   size_t current_ = 0;
   void* body_ = nullptr;
   void (*invoke_)(void*, int) = nullptr;
@@ -157,6 +170,10 @@ class HostGroup {
     const char* all = in_warp(value);
     return value_of<T>(all, lane() == 0 ? 0 : lane() - 1);
   }
+  float exchange(float value, int mask) {
+    const char* all = in_warp(value);
+    return value_of<float>(all, lane() ^ mask);
+  }
   uint32_t add(uint32_t* sum, uint32_t value) {
     const uint32_t before = *sum;
     *sum += value;
@@ -185,12 +202,11 @@ class HostGroup {
 
 /// Runs a kernel as a GPU would with <<<num_blocks, Kernel::kThreads>>>. Shared memory starts with garbage.
 template <class Kernel>
-void run_on_host(int num_blocks, const Kernel& kernel) {
+void run_on_host(HostBlock& block, int num_blocks, const Kernel& kernel) {
   auto shared = std::make_unique<typename Kernel::Shared>();
-  HostBlock block(num_blocks, Kernel::kThreads);
   for (int i = 0; i < num_blocks; ++i) {
     std::memset(static_cast<void*>(shared.get()), 0xff, sizeof(typename Kernel::Shared));
-    block.run(i, [&](int thread) {
+    block.run(i, num_blocks, [&](int thread) {
       HostGroup group(block, thread, Kernel::kThreads);
       kernel(group, *shared);
     });

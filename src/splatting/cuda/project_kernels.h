@@ -94,17 +94,20 @@ struct ProjectKernel {
   uint32_t* keys;
   uint32_t* slots;
   uint32_t* tiles;
+  uint32_t* num_visible;  ///< Counts on from what it holds.
 
   template <class Group>
   PHOTOSLAM_DEVICE void operator()(Group& group, Shared&) const {
     const uint32_t slot = static_cast<uint32_t>(group.block() * kThreads + group.thread());
-    if (slot >= num_slots) return;
     Splat s;
     uint32_t count = 0;
-    if (project(slot, s)) {
+    if (slot < num_slots && project(slot, s)) {
       for_each_tile(s, image, [&](int) { ++count; });
       if (count > 0) splats[slot] = s;
     }
+    const uint32_t visible = group.ballot(count > 0);
+    if (group.lane() == 0 && visible != 0) group.add(num_visible, count_bits(visible));
+    if (slot >= num_slots) return;
     keys[slot] = count > 0 ? sortable_bits(s.z) : 0xffffffffu;
     slots[slot] = slot;
     tiles[slot] = count;
@@ -241,17 +244,20 @@ struct FindTiles {
   }
 };
 
-/// Number of buckets of 32 instances of each tile; prefix sums make them where the tile's buckets begin.
+/// Number of buckets of 32 instances of each tile; prefix sums make them where the tile's buckets begin. Zeros beyond,
+/// up to `num_counts`.
 struct CountBuckets {
   static constexpr int kThreads = 256;
   using Shared = NoShared;
   const uint32_t* tile_begin;
   uint32_t num_tiles;
+  uint32_t num_counts;
   uint32_t* counts;
   template <class Group>
   PHOTOSLAM_DEVICE void operator()(Group& group, Shared&) const {
     const uint32_t i = static_cast<uint32_t>(group.block() * kThreads + group.thread());
     if (i < num_tiles) counts[i] = (tile_begin[i + 1] - tile_begin[i] + kWarpSize - 1) / kWarpSize;
+    if (i >= num_tiles && i < num_counts) counts[i] = 0;
   }
 };
 

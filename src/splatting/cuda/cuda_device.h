@@ -1,0 +1,120 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cuda_runtime.h>
+
+#include <utility>
+
+#include "splatting/cuda/device_engine.h"
+#include "splatting/cuda/group.h"
+
+namespace photoslam::splatting::cuda {
+
+/// Throws unless the call went well; forgets the error, so that the next call does not report it again.
+inline void check_cuda(cudaError_t code, const char* what) {
+  if (code == cudaSuccess) return;
+  (void)cudaGetLastError();
+  throw DeviceError(std::string(what) + ": " + cudaGetErrorString(code), code == cudaErrorMemoryAllocation);
+}
+
+/// One GPU through one stream of its own: everything happens in the order of the calls. Calls that hand data to the
+/// host wait for it; the others only queue.
+class CudaDevice {
+ public:
+  CudaDevice() {
+    check_cuda(cudaGetDevice(&device_), "choosing a GPU");
+    check_cuda(cudaDeviceGetAttribute(&num_units_, cudaDevAttrMultiProcessorCount, device_), "asking the GPU");
+    check_cuda(cudaDeviceGetAttribute(&has_pools_, cudaDevAttrMemoryPoolsSupported, device_), "asking the GPU");
+    check_cuda(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "making a stream");
+    for (cudaEvent_t& event : marks_) check_cuda(cudaEventCreate(&event), "making an event");
+  }
+  ~CudaDevice() {
+    if (stream_ == nullptr) return;
+    (void)cudaStreamSynchronize(stream_);
+    for (cudaEvent_t event : marks_) (void)cudaEventDestroy(event);
+    (void)cudaStreamDestroy(stream_);
+  }
+  CudaDevice(CudaDevice&& other) noexcept
+      : device_(other.device_),
+        num_units_(other.num_units_),
+        has_pools_(other.has_pools_),
+        stream_(std::exchange(other.stream_, nullptr)) {
+    for (int i = 0; i < kMarks; ++i) marks_[i] = std::exchange(other.marks_[i], nullptr);
+  }
+  CudaDevice& operator=(CudaDevice&&) = delete;
+
+  int num_units() const { return num_units_; }
+
+  /// Null: there is no more.
+  void* allocate(size_t bytes) {
+    bind();
+    void* data = nullptr;
+    const size_t size = bytes > 0 ? bytes : 1;
+    const cudaError_t code = has_pools_ != 0 ? cudaMallocAsync(&data, size, stream_) : cudaMalloc(&data, size);
+    if (code == cudaErrorMemoryAllocation) {
+      (void)cudaGetLastError();
+      return nullptr;
+    }
+    check_cuda(code, "allocating GPU memory");
+    return data;
+  }
+  /// Nothing can be done about a failure here; a GPU that is gone says so elsewhere.
+  void release(void* data) {
+    (void)cudaSetDevice(device_);
+    (void)(has_pools_ != 0 ? cudaFreeAsync(data, stream_) : cudaFree(data));
+  }
+
+  /// `from` may change as soon as this returns: pageable memory is staged by the driver.
+  void upload(void* to, const void* from, size_t bytes) {
+    if (bytes == 0) return;
+    bind();
+    check_cuda(cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, stream_), "writing to the GPU");
+  }
+  void download(void* to, const void* from, size_t bytes) {
+    if (bytes == 0) return;
+    bind();
+    check_cuda(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, stream_), "reading from the GPU");
+    wait();
+  }
+  /// Rows of `width` bytes, `pitch` bytes apart, to rows without gaps.
+  void download_rows(void* to, const void* from, size_t pitch, size_t width, size_t rows) {
+    if (rows == 0) return;
+    bind();
+    check_cuda(cudaMemcpy2DAsync(to, width, from, pitch, width, rows, cudaMemcpyDeviceToHost, stream_),
+               "reading from the GPU");
+    wait();
+  }
+  void clear(void* data, size_t bytes) {
+    bind();
+    check_cuda(cudaMemsetAsync(data, 0, bytes, stream_), "clearing GPU memory");
+  }
+
+  template <class Kernel>
+  void launch(int blocks, const Kernel& kernel) {
+    if (blocks <= 0) return;
+    bind();
+    run_kernel<<<static_cast<unsigned>(blocks), Kernel::kThreads, 0, stream_>>>(kernel);
+    check_cuda(cudaGetLastError(), "starting a kernel");
+  }
+
+  void mark(int i) { check_cuda(cudaEventRecord(marks_[i], stream_), "recording an event"); }
+  /// Between two marks; after a download.
+  float milliseconds(int from, int to) const {
+    float milliseconds = 0;
+    check_cuda(cudaEventElapsedTime(&milliseconds, marks_[from], marks_[to]), "reading an event");
+    return milliseconds;
+  }
+
+ private:
+  static constexpr int kMarks = 8;
+
+  void bind() const { check_cuda(cudaSetDevice(device_), "choosing a GPU"); }
+  void wait() { check_cuda(cudaStreamSynchronize(stream_), "waiting for the GPU"); }
+
+  int device_ = 0, num_units_ = 0, has_pools_ = 0;
+  cudaStream_t stream_ = nullptr;
+  cudaEvent_t marks_[kMarks] = {};
+};
+
+}  // namespace photoslam::splatting::cuda

@@ -1,0 +1,520 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+
+// The kernels and what runs them, against plain code and double-precision oracles: on the host, or where nvcc compiles
+// this file, on a GPU.
+#ifndef __SANITIZE_THREAD__  // it does not know fibers
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "splatting/cuda/test_device.h"
+#include "splatting/testing/reference_loss.h"
+#include "splatting/testing/scenes.h"
+
+namespace photoslam::splatting::cuda {
+namespace {
+
+using testing::Scene;
+
+constexpr uint64_t kPlenty = uint64_t{1} << 30;
+
+/// A scene's model on a device.
+struct OnDevice {
+  Engine<TestDevice> engine;
+  std::vector<AnchorView> anchors;
+  DeviceView view;
+  size_t plane;
+  size_t num_blocks;
+  std::vector<float> rgb, depth, alpha;
+  Figures figures;
+
+  explicit OnDevice(const Scene& scene, uint64_t memory_limit = kPlenty)
+      : engine(TestDevice(), memory_limit), plane(scene.plane()), num_blocks(scene.model.num_blocks()) {
+    for (const splatting::Pose& pose : scene.poses)
+      anchors.push_back(make_anchor_view(pose, scene.view.camera, scene.options.near));
+    view.width = scene.width;
+    view.height = scene.height;
+    view.sh_degree = std::min(scene.options.sh_degree, scene.model.sh_degree());
+    std::copy_n(scene.options.background, 3, view.background);
+    view.anchors = anchors.data();
+    view.num_anchors = static_cast<uint32_t>(anchors.size());
+    upload_model(scene.model, engine);
+  }
+  void draw() {
+    figures = engine.forward(view, true);
+    rgb.resize(3 * plane);
+    depth.resize(plane);
+    alpha.resize(plane);
+    engine.read_image({rgb.data(), depth.data(), alpha.data()});
+  }
+  /// All rows of the blocks: [num_blocks, kNumRows, 64].
+  std::vector<float> rows() {
+    std::vector<float> values(num_blocks * kNumRows * kBlockSize);
+    engine.fetch(0, kNumRows, values.data());
+    return values;
+  }
+  static size_t row_at(size_t index, int row, int num_rows = kNumRows) {
+    return (index / kBlockSize * static_cast<size_t>(num_rows) + static_cast<size_t>(row)) * kBlockSize +
+           index % kBlockSize;
+  }
+};
+
+TEST(CudaEngine, SortIsStable) {
+  Random random(5);
+  TestDevice device;
+  Memory<TestDevice> memory(device, kPlenty);
+  for (const uint32_t size : {0u, 1u, 2048u, 5001u}) {
+    const uint32_t capacity = size + 7;
+    std::vector<uint32_t> keys(capacity), values(capacity);
+    for (uint32_t& key : keys) key = static_cast<uint32_t>(random.index(300)) * 70001;
+    std::iota(values.begin(), values.end(), 0u);
+    std::vector<uint32_t> want(values.begin(), values.begin() + size);
+    std::stable_sort(want.begin(), want.end(), [&](uint32_t a, uint32_t b) { return keys[a] < keys[b]; });
+    Pairs<TestDevice> pairs(memory);
+    pairs.reserve(capacity);
+    device.upload(pairs.keys(), keys.data(), capacity * sizeof(uint32_t));
+    device.upload(pairs.values(), values.data(), capacity * sizeof(uint32_t));
+    const auto device_size = to_device<uint32_t>(device, memory, {size});
+    pairs.sort(device, device_size.data(), capacity, 32);
+    std::vector<uint32_t> got(size);
+    device.download(got.data(), pairs.values(), size * sizeof(uint32_t));
+    EXPECT_EQ(got, want);
+  }
+}
+
+TEST(CudaEngine, PrefixSumsSpanRows) {
+  TestDevice device;
+  Memory<TestDevice> memory(device, kPlenty);
+  constexpr uint32_t kCount = 3 * kPrefixColumns + 5;
+  std::vector<uint32_t> values(padded_for_prefix(kCount)), want(kCount);
+  for (uint32_t i = 0; i < kCount; ++i) values[i] = i % 7;
+  std::exclusive_scan(values.begin(), values.begin() + kCount, want.begin(), 0u);
+  const auto array = to_device(device, memory, values);
+  const auto rows = to_device(device, memory, std::vector<uint32_t>(4));
+  const auto total = to_device(device, memory, std::vector<uint32_t>(1));
+  prefix_sums(device, array.data(), kCount, rows.data(), total.data());
+  EXPECT_EQ(to_host(device, array, kCount), want);
+  EXPECT_EQ(to_host(device, total, 1)[0], want.back() + (kCount - 1) % 7);
+}
+
+TEST(CudaEngine, ImagesEqualTheOracle) {
+  for (Scene& scene : testing::hard_scenes()) {
+    scene.build(11);
+    const reference::Image want = reference::render(scene.reference_gaussians, scene.reference_view, scene.noise);
+    OnDevice got(scene);
+    got.draw();
+    ASSERT_EQ(got.figures.lost, 0u) << scene.name;
+    double worst = 0;
+    for (size_t i = 0; i < scene.plane(); ++i) {
+      if (want.ambiguous[i]) continue;
+      for (size_t k = 0; k < 3; ++k)
+        worst = std::max(
+            worst, std::abs(static_cast<double>(got.rgb[k * scene.plane() + i]) - want.rgb[k * scene.plane() + i]));
+      worst = std::max(worst, std::abs(static_cast<double>(got.alpha[i]) - want.alpha[i]));
+      worst = std::max(worst, std::abs(static_cast<double>(got.depth[i]) - want.depth[i]) / scene.depth_max);
+    }
+    std::printf("  %-16s max error %.1e, %u instances\n", scene.name.c_str(), worst, got.figures.instances);
+    EXPECT_LE(worst, scene.image_tolerance) << scene.name;
+  }
+}
+
+/// Relative L2 distance; zero against zero is zero.
+double relative_error(const std::vector<double>& got, const std::vector<double>& want) {
+  double difference = 0, norm = 0;
+  for (size_t i = 0; i < got.size(); ++i) {
+    difference += (got[i] - want[i]) * (got[i] - want[i]);
+    norm += want[i] * want[i];
+  }
+  return norm > 0 ? std::sqrt(difference / norm) : std::sqrt(difference);
+}
+
+TEST(CudaEngine, GradientsEqualTheOracle) {
+  constexpr int kGroups[][2] = {{0, 3}, {3, 7}, {7, 10}, {10, 11}, {11, 14}, {14, 59}};
+  for (Scene& scene : testing::hard_scenes()) {
+    scene.build(12);
+    const reference::Image image = reference::render(scene.reference_gaussians, scene.reference_view, scene.noise);
+    Random random(13);
+    const size_t plane = scene.plane();
+    std::vector<double> dl_drgb(3 * plane), dl_ddepth(plane), dl_dalpha(plane);
+    for (size_t i = 0; i < plane; ++i) {
+      const double keep = image.ambiguous[i] ? 0 : 1;
+      for (size_t k = 0; k < 3; ++k) dl_drgb[k * plane + i] = static_cast<float>(keep * random.normal());
+      dl_ddepth[i] = static_cast<float>(keep * 0.3 * random.normal());
+      dl_dalpha[i] = static_cast<float>(keep * 0.3 * random.normal());
+    }
+    const reference::Gradients want =
+        reference::backward(scene.reference_gaussians, scene.reference_view, dl_drgb, dl_ddepth, dl_dalpha);
+    const auto floats = [](const std::vector<double>& v) { return std::vector<float>(v.begin(), v.end()); };
+    OnDevice device(scene);
+    device.engine.forward(device.view, true);
+    std::vector<float> got(device.num_blocks * static_cast<size_t>(row::kCount) * kBlockSize);
+    const Figures figures =
+        device.engine.backward(floats(dl_drgb).data(), floats(dl_ddepth).data(), floats(dl_dalpha).data(), got.data());
+    for (const auto& group : kGroups) {
+      std::vector<double> a, b;
+      for (size_t i = 0; i < scene.indices.size(); ++i)
+        for (int r = group[0]; r < group[1]; ++r) {
+          a.push_back(static_cast<double>(got[OnDevice::row_at(scene.indices[i], r, row::kCount)]));
+          b.push_back(want.parameters[i][static_cast<size_t>(r)]);
+        }
+      EXPECT_LE(relative_error(a, b), scene.gradient_tolerance) << scene.name << " row " << group[0];
+    }
+    EXPECT_LE(relative_error({figures.pose, figures.pose + 6}, {want.pose.begin(), want.pose.end()}),
+              scene.gradient_tolerance)
+        << scene.name;
+  }
+}
+
+/// Sums and gradient image of a loss case, by the kernels.
+struct LossOnDevice {
+  double l1 = 0, ssim = 0, gain[3] = {}, bias[3] = {};
+  std::vector<float> gradient;
+
+  LossOnDevice(const reference::LossCase& c, float lambda) {
+    TestDevice device;
+    Memory<TestDevice> memory(device, kPlenty);
+    const Extent image{c.width, c.height};
+    const auto render = to_device(device, memory, std::vector<float>(c.render.begin(), c.render.end()));
+    std::vector<uint8_t> planes(c.target.size());
+    for (size_t i = 0; i < planes.size(); ++i) planes[i % 3 * c.plane() + i / 3] = c.target[i];
+    const auto target = to_device(device, memory, planes);
+    const auto mask = to_device(device, memory, c.mask);
+    Array<float, TestDevice> derivatives(memory), dl_drgb(memory), sums(memory);
+    Array<double, TestDevice> totals(memory);
+    derivatives.take(9 * c.plane());
+    dl_drgb.take(3 * c.plane());
+    sums.take(static_cast<size_t>(3 * kLossSums * image.tiles()));
+    totals.take(3 * kLossSums);
+    const Comparison images{render.data(),
+                            target.data(),
+                            c.mask.empty() ? nullptr : mask.data(),
+                            image,
+                            {c.gain[0], c.gain[1], c.gain[2]},
+                            {c.bias[0], c.bias[1], c.bias[2]}};
+    const double values =
+        3.0 * static_cast<double>(c.plane() - static_cast<size_t>(std::count(c.mask.begin(), c.mask.end(), 0)));
+    device.clear(sums.data(), sums.size() * sizeof(float));
+    if (lambda > 0) device.launch(3 * image.tiles(), SsimKernel{images, derivatives.data(), sums.data()});
+    device.launch(3 * image.tiles(), PhotometricKernel{images, lambda > 0 ? derivatives.data() : nullptr,
+                                                       static_cast<float>((1 - static_cast<double>(lambda)) / values),
+                                                       static_cast<float>(static_cast<double>(lambda) / values),
+                                                       dl_drgb.data(), sums.data()});
+    device.launch(3 * kLossSums, SumRows{sums.data(), image.tiles(), totals.data()});
+    gradient = to_host(device, dl_drgb, 3 * c.plane());
+    const std::vector<double> all = to_host(device, totals, 3 * kLossSums);
+    for (int k = 0; k < 3; ++k) {
+      const double* channel = all.data() + k * kLossSums;
+      l1 += channel[kSumL1] / values;
+      ssim += channel[kSumSsim] / values;
+      bias[k] = channel[kSumBias];
+      gain[k] = (channel[kSumValue] - static_cast<double>(c.bias[k]) * bias[k]) / static_cast<double>(c.gain[k]);
+    }
+  }
+};
+
+TEST(CudaEngine, LossEqualsTheDefinition) {
+  for (const auto& [w, h] : {std::pair{37, 29}, {64, 50}, {1, 1}, {5, 3}, {16, 33}})
+    for (const bool masked : {false, true}) {
+      const reference::LossCase c = reference::make_loss_case(w, h, masked && w > 5, 3);
+      double ssim = 0;
+      const double want = reference::photometric_loss(c, 0.2, c.render, &ssim);
+      const LossOnDevice got(c, 0.2f);
+      EXPECT_NEAR(0.8 * got.l1 + 0.2 * (1 - got.ssim), want, 2e-6) << w << "x" << h;
+      EXPECT_NEAR(got.ssim, ssim, 1e-5) << w << "x" << h;
+      EXPECT_NEAR(LossOnDevice(c, 0).l1, reference::photometric_loss(c, 0, c.render), 1e-6);
+      for (size_t i = 0; i < got.gradient.size(); ++i)
+        ASSERT_TRUE(c.mask.empty() || c.mask[i % c.plane()] != 0 || got.gradient[i] == 0.0f) << i;
+    }
+}
+
+TEST(CudaEngine, LossGradientAgreesWithFiniteDifferences) {
+  for (const bool masked : {false, true})
+    for (const double lambda : {0.0, 0.2, 1.0}) {
+      const reference::LossCase c = reference::make_loss_case(18, 37, masked, 7);
+      const LossOnDevice got(c, static_cast<float>(lambda));
+      Random random(8);
+      double difference = 0, norm = 0;
+      for (int probe = 0; probe < 12; ++probe) {
+        const size_t i = static_cast<size_t>(random.index(static_cast<int>(c.render.size())));
+        std::vector<double> plus = c.render, minus = c.render;
+        plus[i] += 1e-5;
+        minus[i] -= 1e-5;
+        const double numeric =
+            (reference::photometric_loss(c, lambda, plus) - reference::photometric_loss(c, lambda, minus)) / 2e-5;
+        difference += std::pow(numeric - static_cast<double>(got.gradient[i]), 2);
+        norm += numeric * numeric;
+      }
+      EXPECT_LE(std::sqrt(difference / norm), 1e-4) << "lambda " << lambda << " masked " << masked;
+    }
+}
+
+TEST(CudaEngine, ExposureGradientAgreesWithFiniteDifferences) {
+  const reference::LossCase c = reference::make_loss_case(40, 30, true, 9);
+  const LossOnDevice got(c, 0.2f);
+  for (size_t k = 0; k < 6; ++k) {
+    const auto moved = [&](float step) {
+      reference::LossCase other = c;
+      (k < 3 ? other.gain[k] : other.bias[k - 3]) += step;
+      return reference::photometric_loss(other, 0.2, other.render);
+    };
+    const double numeric = (moved(1e-4f) - moved(-1e-4f)) / 2e-4;
+    EXPECT_NEAR(k < 3 ? got.gain[k] : got.bias[k - 3], numeric, 2e-3 * std::abs(numeric) + 1e-4) << k;
+  }
+}
+
+TEST(CudaEngine, DepthLossComparesWithTheDepthThatTheOpacityAllows) {
+  // D = 1.5, A = 0.5, d = 2: residual 0.5; a pixel without depth does not count.
+  TestDevice device;
+  Memory<TestDevice> memory(device, kPlenty);
+  const auto depth = to_device<float>(device, memory, {1.5f, 9});
+  const auto alpha = to_device<float>(device, memory, {0.5f, 1});
+  const auto truth = to_device<uint16_t>(device, memory, {2000, 0});
+  const auto by_depth = to_device<float>(device, memory, {7, 7}), by_alpha = to_device<float>(device, memory, {7, 7});
+  const auto sum = to_device<float>(device, memory, {7});
+  device.launch(1, DepthLossKernel{depth.data(), alpha.data(), truth.data(), 2, 1e-3f, 3, by_depth.data(),
+                                   by_alpha.data(), sum.data()});
+  EXPECT_NEAR(to_host(device, sum, 1)[0], 0.5, 1e-6);
+  EXPECT_EQ(to_host(device, by_depth, 2), (std::vector<float>{3, 0}));
+  EXPECT_EQ(to_host(device, by_alpha, 2), (std::vector<float>{-6, -0.0f}));
+}
+
+/// Target, loss and constants of training steps on a scene.
+struct Lesson {
+  std::vector<uint8_t> rgb;
+  DeviceTarget target;
+  DeviceLoss loss;
+  UpdateConstants constants;
+
+  explicit Lesson(const Scene& scene) : rgb(3 * scene.plane()) {
+    Random random(22);
+    for (uint8_t& value : rgb) value = static_cast<uint8_t>(random.index(256));
+    target.id = 1;
+    target.rgb = rgb.data();
+    target.num_valid = static_cast<int>(scene.plane());
+    constants.beta1 = 0.9f;
+    constants.beta2 = 0.999f;
+    constants.epsilon2 = 1e-30f;
+    constants.log_beta1 = std::log(0.9f);
+    constants.log_beta2 = std::log(0.999f);
+    constants.bias_correction = true;
+    for (int r = 0; r < row::kCount; ++r) constants.rates[r] = r < row::kSh ? 1e-3f : 2e-3f;
+    constants.rates[row::kOpacity] = 0;  // frozen
+  }
+  /// dL/drgb of the L1 loss, in the render's layout.
+  std::vector<float> l1_gradient(const std::vector<float>& render) const {
+    std::vector<float> gradient(rgb.size());
+    for (size_t i = 0; i < rgb.size(); ++i) {
+      const float difference = render[i] - static_cast<float>(rgb[i]) / 255.0f;
+      const float scale = 1.0f / static_cast<float>(rgb.size());
+      gradient[i] = difference > 0 ? scale : -scale;
+    }
+    return gradient;
+  }
+};
+
+TEST(CudaEngine, StepIsAdamOnTheGradientsOfTheLoss) {
+  Scene scene;
+  scene.anchors = 2;
+  scene.build(21);
+  const Lesson lesson(scene);
+  OnDevice device(scene);
+  std::vector<double> m(device.num_blocks * row::kCount * kBlockSize), v(m.size()),
+      visible(device.num_blocks * kBlockSize);
+  for (int step = 1; step <= 3; ++step) {
+    device.draw();
+    std::vector<float> gradients(m.size());
+    const Figures plain =
+        device.engine.backward(lesson.l1_gradient(device.rgb).data(), nullptr, nullptr, gradients.data());
+    const std::vector<float> before = device.rows();
+    const Figures figures = device.engine.step(device.view, lesson.target, lesson.loss, lesson.constants, true);
+    const std::vector<float> after = device.rows();
+    for (int i = 0; i < 6; ++i) EXPECT_NEAR(figures.pose[i], plain.pose[i], 1e-6 * std::abs(plain.pose[i]) + 1e-12);
+    int num_visible = 0;
+    for (const size_t index : scene.indices) {
+      const auto now = [&](int row) { return static_cast<double>(after[OnDevice::row_at(index, row)]); };
+      const auto was = [&](int row) { return static_cast<double>(before[OnDevice::row_at(index, row)]); };
+      const bool is_visible = now(kStatisticsRow + 3) > was(kStatisticsRow + 3);
+      num_visible += is_visible ? 1 : 0;
+      visible[index] += is_visible ? 1 : 0;
+      EXPECT_EQ(now(kUpdatesRow), visible[index]);
+      for (int r = 0; r < row::kCount; ++r) {
+        const size_t at = OnDevice::row_at(index, r, row::kCount);
+        const double g = static_cast<double>(gradients[at]), rate = static_cast<double>(lesson.constants.rates[r]);
+        if (!is_visible || rate == 0) {
+          ASSERT_EQ(now(r), was(r));
+          continue;
+        }
+        m[at] = 0.9 * m[at] + 0.1 * g;
+        v[at] = 0.999 * v[at] + 0.001 * g * g;
+        if (std::abs(g) < 1e-13) continue;  // squares leave the range of fp32
+        const double n = visible[index];
+        const double want =
+            -rate * m[at] / (1 - std::pow(0.9, n)) / std::sqrt(v[at] / (1 - std::pow(0.999, n)) + 1e-30);
+        ASSERT_NEAR(now(r) - was(r), want, 1e-4 * std::abs(want) + 5e-5 * rate + 1.2e-7 * std::abs(was(r)))
+            << "step " << step << " row " << r;
+      }
+    }
+    EXPECT_EQ(figures.visible, static_cast<uint32_t>(num_visible));
+  }
+}
+
+TEST(CudaEngine, StepsAreTheSameInEveryRunAndWhereMemoryHasToGrow) {
+  Scene scene;
+  scene.count = 150;
+  scene.log_scale_max = -0.3;  // large: far more instances than a first guess has room for
+  scene.width = 300;
+  scene.height = 200;
+  scene.build(25);
+  const Lesson lesson(scene);
+  std::vector<std::vector<float>> results;
+  for (int run = 0; run < 2; ++run) {
+    OnDevice device(scene);
+    if (run == 1) device.draw();  // it has grown before the first step
+    DeviceLoss loss = lesson.loss;
+    loss.ssim_weight = 0.2f;
+    const Figures figures = device.engine.step(device.view, lesson.target, loss, lesson.constants, true);
+    EXPECT_EQ(figures.lost, 0u);
+    EXPECT_GT(figures.instances, 6u * 64 * static_cast<uint32_t>(device.num_blocks));
+    results.push_back(device.rows());
+  }
+  EXPECT_EQ(results[0], results[1]);
+}
+
+TEST(CudaEngine, WhatFindsNoRoomIsTheFarthest) {
+  Scene scene;
+  scene.count = 150;
+  scene.log_scale_max = -0.3;
+  scene.width = 300;
+  scene.height = 200;
+  scene.build(25);
+  OnDevice all(scene);
+  all.draw();
+  // What the image and the model take, and the first guess at instances; then some for half of what is missing.
+  const uint64_t limit = all.engine.peak_bytes() * 3 / 4;
+  OnDevice some(scene, limit);
+  some.draw();
+  EXPECT_GT(some.figures.lost, 0u);
+  EXPECT_EQ(some.figures.instances + some.figures.lost, all.figures.instances);
+  EXPECT_LE(some.engine.peak_bytes(), limit);
+  for (size_t i = 0; i < scene.plane(); ++i) EXPECT_LE(some.alpha[i], all.alpha[i] + 1e-6f);
+}
+
+TEST(CudaEngine, OutOfMemoryLeavesTheModelAsItWas) {
+  Scene scene;
+  scene.build(26);
+  const Lesson lesson(scene);
+  OnDevice plenty(scene);
+  const std::vector<float> want = plenty.rows();
+  plenty.engine.step(plenty.view, lesson.target, lesson.loss, lesson.constants, true);
+  const uint64_t peak = plenty.engine.peak_bytes();
+  for (uint64_t limit = peak / 4; limit < peak; limit += peak / 16) {
+    std::unique_ptr<OnDevice> device;
+    try {
+      device = std::make_unique<OnDevice>(scene, limit);
+    } catch (const DeviceError& error) {
+      EXPECT_TRUE(error.out_of_memory);
+      continue;
+    }
+    try {
+      device->engine.step(device->view, lesson.target, lesson.loss, lesson.constants, true);
+    } catch (const DeviceError& error) {
+      EXPECT_TRUE(error.out_of_memory);
+      EXPECT_EQ(device->rows(), want);
+    }
+    EXPECT_LE(device->engine.peak_bytes(), limit);
+  }
+}
+
+TEST(CudaEngine, TargetsGiveWayWhenMemoryIsShort) {
+  Scene scene;
+  scene.count = 64;
+  scene.build(27);
+  const Lesson lesson(scene);
+  OnDevice roomy(scene);
+  roomy.engine.step(roomy.view, lesson.target, lesson.loss, lesson.constants, false);
+  const uint64_t one = roomy.engine.peak_bytes();
+  OnDevice device(scene, one + 10 * scene.plane());  // a second target, no third
+  DeviceTarget target = lesson.target;
+  for (const uint64_t id : {1, 2, 3, 1, 4, 2}) {
+    target.id = id;
+    const Figures figures = device.engine.step(device.view, target, lesson.loss, lesson.constants, false);
+    EXPECT_GT(figures.channels[0].l1, 0);
+  }
+  device.engine.forget_target(2);
+  device.engine.forget_target(77);  // never seen
+  EXPECT_NO_THROW(device.engine.step(device.view, target, lesson.loss, lesson.constants, false));
+}
+
+TEST(CudaEngine, NothingToDrawIsTheBackground) {
+  Scene scene;
+  scene.count = 0;
+  scene.width = 20;
+  scene.height = 17;
+  scene.build(28);
+  const Lesson lesson(scene);
+  OnDevice device(scene);
+  device.draw();
+  for (size_t i = 0; i < scene.plane(); ++i) {
+    EXPECT_EQ(device.rgb[scene.plane() + i], scene.options.background[1]);
+    EXPECT_EQ(device.alpha[i], 0);
+  }
+  const Figures figures = device.engine.step(device.view, lesson.target, lesson.loss, lesson.constants, true);
+  EXPECT_EQ(figures.visible, 0u);
+  EXPECT_EQ(figures.pose[0], 0);
+}
+
+TEST(CudaEngine, ArrangementsMoveGaussiansWithAllThatBelongsToThem) {
+  Scene scene;
+  scene.count = 200;
+  scene.build(29);
+  OnDevice device(scene);
+  const std::vector<float> before = device.rows();
+  // Backwards in three blocks, every fifth dropped, one from the host; then one more block in place.
+  std::vector<uint32_t> sources(3 * kBlockSize, kFromNowhere);
+  for (uint32_t i = 0; i < 150; ++i)
+    if (i % 5 != 0) sources[i] = 199 - i;
+  std::vector<float> records(kNumRows);
+  std::iota(records.begin(), records.end(), 1.0f);
+  sources[0] = kFromHost;
+  const std::vector<int32_t> anchors = {0, 0, 0, 0}, counts = {64, 64, 22, 1};
+  Arrangement a;
+  a.num_blocks = 3;
+  a.sources = sources.data();
+  a.anchors = anchors.data();
+  a.counts = counts.data();
+  a.records = records.data();
+  a.num_records = 1;
+  a.moves = true;
+  device.engine.arrange(a);
+  device.num_blocks = 3;
+  const auto check = [&](const std::vector<float>& after) {
+    for (uint32_t i = 0; i < 3 * kBlockSize; ++i)
+      for (int r = 0; r < kNumRows; ++r) {
+        const float want = i == 0                       ? static_cast<float>(r + 1)
+                           : sources[i] == kFromNowhere ? 0.0f
+                                                        : before[OnDevice::row_at(sources[i], r)];
+        ASSERT_EQ(after[OnDevice::row_at(i, r)], want) << i << " row " << r;
+      }
+  };
+  check(device.rows());
+  std::vector<uint32_t> stay(4 * kBlockSize, kFromNowhere);
+  std::iota(stay.begin(), stay.begin() + 3 * kBlockSize, 0u);
+  stay[3 * kBlockSize] = kFromHost;
+  a.num_blocks = 4;
+  a.sources = stay.data();
+  a.moves = false;
+  device.engine.arrange(a);
+  device.num_blocks = 4;
+  const std::vector<float> after = device.rows();
+  check(after);
+  EXPECT_EQ(after[OnDevice::row_at(3 * kBlockSize, 5)], 6);
+}
+
+}  // namespace
+}  // namespace photoslam::splatting::cuda
+
+#endif  // __SANITIZE_THREAD__

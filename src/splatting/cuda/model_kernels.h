@@ -1,0 +1,72 @@
+// Copyright the photoslam authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "splatting/cuda/project_kernels.h"
+
+namespace photoslam::splatting::cuda {
+
+/// A block is a table of rows of 64 floats: parameters, moments and step counts, statistics; others follow.
+inline constexpr int kFirstMomentRow = row::kCount;
+inline constexpr int kUpdatesRow = 3 * row::kCount;
+inline constexpr int kStatisticsRow = kUpdatesRow + 1;
+inline constexpr int kNumRows = kStatisticsRow + 4;
+static_assert(offsetof(Block, first_moments) == sizeof(float) * kBlockSize * kFirstMomentRow);
+static_assert(offsetof(Block, updates) == sizeof(float) * kBlockSize * kUpdatesRow);
+static_assert(offsetof(Block, gradient) == sizeof(float) * kBlockSize * kStatisticsRow);
+static_assert(offsetof(Block, tags) == sizeof(float) * kBlockSize * kNumRows);
+
+/// Where the values of a slot come from: a slot of the model as it was, kFromHost + i: record i of the host, or
+/// nowhere: zeros.
+inline constexpr uint32_t kFromHost = 0x80000000u;
+inline constexpr uint32_t kFromNowhere = 0xffffffffu;
+
+/// Rearranges the model: one thread block per block of the new model, one thread per slot. `from` and `to` may be the
+/// same when no slot moves: then what stays is not touched.
+struct RearrangeKernel {
+  static constexpr int kThreads = kBlockSize;
+  using Shared = NoShared;
+  const Block* from;
+  Block* to;
+  const uint32_t* sources;  ///< [slots]
+  const int32_t* anchors;   ///< [blocks]
+  const int32_t* counts;    ///< [blocks]
+  const float* records;     ///< [records, kNumRows]
+
+  template <class Group>
+  PHOTOSLAM_DEVICE void operator()(Group& group, Shared&) const {
+    const uint32_t rank = static_cast<uint32_t>(group.block()), lane = static_cast<uint32_t>(group.thread());
+    const uint32_t slot = rank * kBlockSize + lane, source = sources[slot];
+    Block& block = to[rank];
+    if (lane == 0) {
+      block.anchor = anchors[rank];
+      block.count = counts[rank];
+    }
+    if (source == slot && from == to) return;
+    float* out = &block.parameters[0][0] + lane;
+    if (source == kFromNowhere) {
+      for (int r = 0; r < kNumRows; ++r) out[r * kBlockSize] = 0;
+    } else if (source >= kFromHost) {
+      const float* record = records + size_t{source - kFromHost} * kNumRows;
+      for (int r = 0; r < kNumRows; ++r) out[r * kBlockSize] = record[r];
+    } else {
+      const float* in = &from[source / kBlockSize].parameters[0][0] + source % kBlockSize;
+      for (int r = 0; r < kNumRows; ++r) out[r * kBlockSize] = in[r * kBlockSize];
+    }
+  }
+};
+
+/// Sets the statistics of all gaussians to zero: one thread block per block of the model.
+struct ClearStatistics {
+  static constexpr int kThreads = kBlockSize;
+  using Shared = NoShared;
+  Block* blocks;
+  template <class Group>
+  PHOTOSLAM_DEVICE void operator()(Group& group, Shared&) const {
+    Block& block = blocks[group.block()];
+    const int lane = group.thread();
+    block.gradient[lane] = block.weight[lane] = block.max_weight[lane] = block.visible[lane] = 0;
+  }
+};
+
+}  // namespace photoslam::splatting::cuda
