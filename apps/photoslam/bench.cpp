@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "backend_arguments.h"
 #include "base/clock.h"
 #include "commands.h"
 #include "image/convert.h"
@@ -34,6 +35,7 @@ struct BenchArguments {
   double zoom = 1.0;
   int rounds = 4;
   std::string simd;
+  BackendArguments backend{.backend = "cpu"};
   bool json = false;
 };
 
@@ -148,11 +150,15 @@ Status bench_splat(const BenchArguments& arguments) {
   }
   const auto views = load_views(arguments);
   if (!views) return views.error();
+  const auto gpu = arguments.backend.open();
+  if (!gpu) return gpu.error();
   ThreadPool executor(threads);
   const splatting::BenchReport report =
-      splatting::bench_training(model, *views, arguments.rounds, splatting::TrainOptions{}, executor);
+      splatting::bench_training(model, *views, arguments.rounds, splatting::TrainOptions{}, executor, *gpu);
+  if (*gpu && !(*gpu)->failure().empty()) return error("the GPU has failed: {}", (*gpu)->failure());
   const double trainer_mb = peak_rss_mb() - rss_at_start_mb - file_mb;
-  const auto figures = to_json(report, views->front().camera, threads, trainer_mb, splatting::probe_machine(executor));
+  auto figures = to_json(report, views->front().camera, threads, trainer_mb, splatting::probe_machine(executor));
+  if (*gpu) figures.update({{"gpu", (*gpu)->name()}, {"gpu_mb", (*gpu)->peak_mb()}});
   if (arguments.json) {
     fmt::print("{}\n", figures.dump(2));
   } else {
@@ -177,6 +183,7 @@ void add_bench(CommandLine& line) {
   command.add_option("--zoom", a.zoom, "Multiplies the focal lengths")->check(CLI::Range(0.01, 1000.0));
   command.add_option("--rounds", a.rounds, "Training steps per camera")->check(CLI::Range(1, 100000));
   command.add_option("--simd", a.simd, "SIMD target: AVX3, AVX2, SSE4 or NEON; default: the best this machine has");
+  a.backend.bind(command);
   command.add_flag("--json", a.json, "Print JSON");
   line.on_run(command, [arguments] { return bench_splat(*arguments); });
 }

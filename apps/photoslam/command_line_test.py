@@ -106,6 +106,21 @@ class UsageTest(CommandLineTest):
             self.assertIn(word, result.stdout)
 
 
+class BackendTest(CommandLineTest):
+    def test_backends(self):
+        has_gpu = "compute capability" in photoslam("doctor").stdout
+        self.assert_fails(photoslam("render", "map.ply", "--orbit", "--backend", "metal"), 2, "--backend")
+        run = ["run", SEQUENCE, "--output", self.output, *FAST]
+        result = photoslam(*run, "--backend", "cuda")
+        if not has_gpu:
+            self.assert_fails(result, 1, "--backend cuda: no GPU")
+        result = photoslam(*run)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("splatting on the GPU" if has_gpu else "splatting on the CPU (no GPU", result.stderr)
+        report = json.loads((self.output / "report.json").read_text(encoding="utf-8"))
+        self.assertEqual(report["memory"]["gpu_mb"] is not None, has_gpu)
+
+
 class ConfigTest(CommandLineTest):
     def test_printed_configuration_loads_back(self):
         file = self.folder / "config.toml"

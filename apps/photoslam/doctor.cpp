@@ -15,6 +15,7 @@
 #include "base/file.h"
 #include "base/version.h"
 #include "commands.h"
+#include "splatting/gpu.h"
 
 namespace photoslam {
 namespace {
@@ -69,7 +70,8 @@ Status report_machine() {
   print_row("SIMD", instruction_sets());
   print_row("libraries", fmt::format("Eigen {}.{}.{}, Highway {}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION,
                                      EIGEN_MINOR_VERSION, HWY_MAJOR, HWY_MINOR, HWY_PATCH));
-  print_row("splatting", "cpu: ready; cuda: not part of this build");
+  const auto gpu = splatting::describe_gpu();
+  print_row("splatting", "cpu: ready; cuda: " + (gpu ? *gpu : gpu.error().message));
   print_row("input", "TUM RGB-D, Replica RGB-D; mono, stereo, video and live cameras: not part of this build");
   print_row("LPIPS", "not part of this build: image.lpips is null in reports");
   print_row("write", write_access());

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <thread>
 
+#include "backend_arguments.h"
 #include "base/clock.h"
 #include "base/file.h"
 #include "commands.h"
@@ -34,6 +35,7 @@ struct RenderArguments {
   int orbit_frames = 120;
   fs::path output = "output/render";
   std::string format = "png";
+  BackendArguments backend;
 };
 
 /// A horizontal circle around the middle of the map, looking inwards.
@@ -104,11 +106,13 @@ Status render(const RenderArguments& arguments) {
   const auto views = choose_views(arguments, *map);
   if (!views) return views.error();
   if (Status status = prepare_output_folder(arguments.output); !status) return status;
+  const auto gpu = arguments.backend.open();
+  if (!gpu) return gpu.error();
 
   const splatting::GaussianModel model = from_world(*map);
   const std::vector<SE3> world = {SE3{}};
   ThreadPool executor(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
-  splatting::Renderer renderer;
+  splatting::Renderer renderer(*gpu);
   splatting::RenderResult result;
   std::vector<splatting::Pose> camera_from_anchor;
   double render_ms = 0;
@@ -120,6 +124,7 @@ Status render(const RenderArguments& arguments) {
     render_ms += clock.milliseconds();
     if (Status status = write_view(arguments, i, result); !status) return status;
   }
+  report_failure(gpu->get());
   fmt::print("{} images of {} gaussians in {}, {:.1f} ms each to render\n", views->size(), map->size(),
              arguments.output.string(), render_ms / static_cast<double>(views->size()));
   return {};
@@ -147,6 +152,7 @@ void add_render(CommandLine& line) {
   command.add_option("--format", a.format, "png: 8-bit; npy: float32 [height, width, 3]")
       ->check(CLI::IsMember({"png", "npy"}))
       ->capture_default_str();
+  a.backend.bind(command);
   line.on_run(command, [arguments] { return render(*arguments); });
 }
 

@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 #include <thread>
 
+#include "backend_arguments.h"
 #include "base/file.h"
 #include "base/version.h"
 #include "commands.h"
@@ -39,6 +41,7 @@ struct RunArguments {
   fs::path load_map;
   bool no_session = false;
   RunSettings settings;
+  BackendArguments backend;
   ConfigArguments config;
   bool json = false;
 };
@@ -98,6 +101,13 @@ Result<std::unique_ptr<FrameSource>> reopen(const fs::path& path, const SourceOp
   return open_source(path, options);
 }
 
+void describe_gpu_use(const splatting::Gpu& gpu, const RunOutcome& run, Report& report) {
+  const double seconds = run.seconds_online + run.seconds_drain + run.seconds_refine;
+  report.memory.gpu_mb = gpu.peak_mb();
+  report.machine += fmt::format("; GPU {}, busy {:.0f} % of the time", gpu.name(),
+                                100 * gpu.busy_seconds() / std::max(seconds, 1e-9));
+}
+
 /// Trajectories and map are on disk before anything is measured.
 Status save_and_evaluate(const RunArguments& arguments, const SystemOptions& options, const RunSettings& settings,
                          const SourceInfo& info, const RunOutcome& run) {
@@ -123,6 +133,7 @@ Status save_and_evaluate(const RunArguments& arguments, const SystemOptions& opt
   fmt::print(stderr, "measuring\n");
   HtmlReport html = evaluate_run(run, options, **source, truth, !run.interrupted, executor);
   html.report.map.size_mb = 1e-6 * static_cast<double>(map_bytes);
+  if (settings.gpu) describe_gpu_use(*settings.gpu, run, html.report);
   if (Status status = write_report(arguments.output / "report.json", html.report); !status) return status;
   if (Status status = write_html_report(arguments.output / "report.html", html); !status) return status;
   fmt::print("{}", arguments.json ? to_json(html.report) : result_table(html.report));
@@ -140,6 +151,9 @@ Status run(const RunArguments& arguments) {
   if (Status status = load_session(arguments.load_map, info, settings); !status) return status;
   if (Status status = prepare_output_folder(arguments.output); !status) return status;
   announce(info, arguments);
+  auto gpu = arguments.backend.open();
+  if (!gpu) return gpu.error();
+  settings.gpu = *gpu;
 
   InterruptGuard interrupt;
   RunOutcome outcome;
@@ -152,6 +166,7 @@ Status run(const RunArguments& arguments) {
     });
     if (!preview.failure().empty()) fmt::print(stderr, "  note: no preview: {}\n", preview.failure());
   }
+  report_failure(gpu->get());
   if (outcome.final.keyframes_from_world.empty()) {
     const std::string why = outcome.frames.empty() ? "no frame was read" : outcome.frames.back().reason;
     return error("nothing could be mapped: {}{}", why, outcome.failure.empty() ? "" : " (" + outcome.failure + ")");
@@ -224,6 +239,7 @@ void add_run(CommandLine& line) {
       ->check(CLI::Range(0.0, 1e6));
   command.add_option("--threads", a.settings.threads, "Threads for mapping; 0: one per core")
       ->check(CLI::Range(0, 1024));
+  a.backend.bind(command);
   a.config.bind(command);
   command.add_flag("--json", a.json, "Print the report as JSON instead of the table");
   line.on_run(command, [arguments]() -> Status {

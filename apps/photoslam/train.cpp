@@ -5,6 +5,7 @@
 #include <memory>
 #include <thread>
 
+#include "backend_arguments.h"
 #include "base/clock.h"
 #include "base/file.h"
 #include "commands.h"
@@ -36,6 +37,7 @@ struct TrainArguments {
   int hold_out = 0;
   int threads = 0;
   uint64_t seed = 1;
+  BackendArguments backend;
   ConfigArguments config;
 };
 
@@ -204,6 +206,8 @@ Status train(const TrainArguments& arguments) {
   const auto start = initial_gaussians(arguments, *input);
   if (!start) return start.error();
   if (Status status = prepare_output_folder(arguments.output); !status) return status;
+  const auto gpu = arguments.backend.open();
+  if (!gpu) return gpu.error();
   if (!start->empty()) options->photorealistic_mapping.depth.enabled = false;
 
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
@@ -219,7 +223,7 @@ Status train(const TrainArguments& arguments) {
              input->camera.height, poses.size());
 
   const InterruptGuard interrupt;
-  PhotorealisticMapper mapper(options->photorealistic_mapping, {.camera = input->camera}, arguments.seed);
+  PhotorealisticMapper mapper(options->photorealistic_mapping, {.camera = input->camera}, arguments.seed, *gpu);
   int32_t keyframe = 0;
   for (size_t i = 0; i < input->images.size(); ++i) {
     if (is_held_out(arguments, i)) continue;
@@ -229,6 +233,7 @@ Status train(const TrainArguments& arguments) {
   train_until_done(arguments, interrupt.token(), executor, mapper);
 
   const FrozenMap trained = mapper.freeze();
+  report_failure(gpu->get());
   const auto written =
       write_gaussian_ply(arguments.output / "map.ply", to_world(trained.gaussians, trained.anchors_from_world));
   if (!written) return written.error();
@@ -260,6 +265,7 @@ void add_train(CommandLine& line) {
   command.add_option("--hold-out", a.hold_out, "Keep every Nth image for scoring")->check(CLI::Range(0, 1000000));
   command.add_option("--seed", a.seed, "Seed of everything random")->capture_default_str();
   command.add_option("--threads", a.threads, "Threads; 0: one per core")->check(CLI::Range(0, 1024));
+  a.backend.bind(command);
   a.config.bind(command);
   line.on_run(command, [arguments] { return train(*arguments); });
 }

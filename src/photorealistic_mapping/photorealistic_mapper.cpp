@@ -62,8 +62,14 @@ void PhotorealisticOptions::visit(OptionVisitor& v) {
   v.group("exposure", "Brightness of each keyframe's picture.", exposure);
 }
 
-PhotorealisticMapper::PhotorealisticMapper(const PhotorealisticOptions& options, MapperSensor sensor, uint64_t seed)
-    : options_(options), sensor_(std::move(sensor)), random_(seed), schedule_(options.schedule, seed + 1) {
+PhotorealisticMapper::PhotorealisticMapper(const PhotorealisticOptions& options, MapperSensor sensor, uint64_t seed,
+                                           std::shared_ptr<splatting::Gpu> gpu)
+    : options_(options),
+      sensor_(std::move(sensor)),
+      random_(seed),
+      schedule_(options.schedule, seed + 1),
+      trainer_(gpu),
+      renderer_(std::move(gpu)) {
   model_.set_sh_degree(options.sh_degree);
 }
 

@@ -81,7 +81,9 @@ struct KeyframeComparison {
 /// a seed, at any concurrency of the executor.
 class PhotorealisticMapper {
  public:
-  PhotorealisticMapper(const PhotorealisticOptions& options, MapperSensor sensor, uint64_t seed);
+  /// Trains and draws on the GPU, as long as that works, or (null) on the CPU.
+  PhotorealisticMapper(const PhotorealisticOptions& options, MapperSensor sensor, uint64_t seed,
+                       std::shared_ptr<splatting::Gpu> gpu = nullptr);
 
   /// Takes over the poses of all keyframes, and with them moves the gaussians. Where a keyframe's scale has changed,
   /// all that is measured in its frame grows with it.

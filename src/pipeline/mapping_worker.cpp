@@ -9,7 +9,7 @@ namespace photoslam {
 
 MappingWorker::MappingWorker(const SystemOptions& options, const RunSettings& settings, MapperSensor sensor,
                              Executor& executor)
-    : mapper_(options.photorealistic_mapping, std::move(sensor), settings.seed),
+    : mapper_(options.photorealistic_mapping, std::move(sensor), settings.seed, settings.gpu),
       executor_(executor),
       session_file_(settings.session_file),
       preview_(settings.preview) {}

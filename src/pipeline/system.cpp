@@ -364,7 +364,12 @@ void Session::refine(const std::function<void(const Progress&)>& on_progress) {
     const double done = settings_.refine_iterations > 0 ? static_cast<double>(i) / settings_.refine_iterations
                                                         : elapsed / std::max(settings_.refine_seconds, 1e-9);
     if (done >= 1.0 || (settings_.refine_iterations == 0 && settings_.refine_seconds <= 0)) break;
-    mapping_.refine(done);
+    try {
+      mapping_.refine(done);
+    } catch (const std::exception& e) {
+      failures_.report("photorealistic mapping", e.what());
+      break;
+    }
     if (elapsed - last_report < 1e-3 * static_cast<double>(kProgressInterval.count())) continue;
     last_report = elapsed;
     outcome_.refinement.push_back({elapsed, mapping_.iterations, mapping_.training_psnr, mapping_.gaussians});

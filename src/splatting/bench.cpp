@@ -9,6 +9,7 @@
 #include "base/clock.h"
 #include "splatting/cpu/buffer.h"
 #include "splatting/cpu/targets.h"
+#include "splatting/gpu.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "splatting/bench.cpp"
@@ -80,9 +81,9 @@ struct Samples {
 }  // namespace
 
 BenchReport bench_training(GaussianModel& model, std::span<const BenchView> views, int rounds,
-                           const TrainOptions& options, Executor& executor) {
+                           const TrainOptions& options, Executor& executor, const std::shared_ptr<Gpu>& gpu) {
   PHOTOSLAM_CHECK(!views.empty() && rounds >= 1, "{} views, {} rounds", views.size(), rounds);
-  Trainer trainer;
+  Trainer trainer(gpu);
   Samples samples;
   BenchReport report{.gaussians = model.size(), .stages = {}};
   std::vector<Pose> poses(static_cast<size_t>(model.num_anchors()));
@@ -101,14 +102,15 @@ BenchReport bench_training(GaussianModel& model, std::span<const BenchView> view
     report.loss_last = loss;
   }
   report.wall_ms = wall.milliseconds();
-  Renderer renderer;
+  Renderer renderer(gpu);
   RenderResult image;
   for (int round = -1; round < rounds; ++round)
     for (const BenchView& view : views) {
       std::fill(poses.begin(), poses.end(), view.camera_from_model);
       Stopwatch watch;
       renderer.render(model, {view.camera, poses}, options.render, executor, image);
-      if (round >= 0) samples.render.push_back(watch.milliseconds());
+      const bool on_gpu = gpu != nullptr && gpu->failure().empty();
+      if (round >= 0) samples.render.push_back(on_gpu ? renderer.times().total() : watch.milliseconds());
     }
   report.iterations = static_cast<int>(samples.total.size());
   report.visible = median(samples.visible);

@@ -32,9 +32,10 @@ struct BenchReport {
 };
 
 /// Real optimisation steps (the mapper's own) over all views, `rounds` times, after one round to warm up; then renders
-/// them. Changes the model. Nothing is kept between steps but buffers.
+/// them. Changes the model. Nothing is kept between steps but buffers. Of a GPU, steps are timed as the caller sees
+/// them, rendering without the way of the image to the host.
 BenchReport bench_training(GaussianModel& model, std::span<const BenchView> views, int rounds,
-                           const TrainOptions& options, Executor& executor);
+                           const TrainOptions& options, Executor& executor, const std::shared_ptr<Gpu>& gpu = {});
 
 /// What the machine can do, to compare figures between machines.
 struct MachineProbe {

@@ -33,11 +33,6 @@ struct LossBand {
   float ssim_scale;  ///< λ / number of compared values
 };
 
-/// Sums over a band.
-struct LossSums {
-  double l1 = 0, ssim = 0, mse = 0, gain = 0, bias = 0;
-};
-
 inline constexpr int kRadius = kSsimRadius;
 inline constexpr int kWindow = 2 * kRadius + 1;
 /// Zeros on either side of a row, and lanes to run over its end.
@@ -160,7 +155,7 @@ void finish_row(const LossBand& band, int y, const float* a, const float* b, flo
   sums.l1 += sum(l1);
   sums.mse += sum(mse);
   sums.bias += sum(bias);
-  sums.gain += sum(by_value);  // Σ g (gain r + bias): made Σ g r at the end
+  sums.value += sum(by_value);
 }
 
 /// dSSIM/da where there is data: the derivatives filtered once more, and zero elsewhere.
@@ -299,22 +294,31 @@ PhotometricLoss LossFunction::evaluate(std::span<const float> rgb, const TargetI
       HWY_DYNAMIC_DISPATCH(l1_band)(band, scratch, out);
   });
 
+  LossSums channels[3];
+  for (size_t i = 0; i < sums.size(); ++i) {
+    LossSums& channel = channels[i / static_cast<size_t>(bands)];
+    channel.l1 += sums[i].l1;
+    channel.ssim += sums[i].ssim;
+    channel.mse += sums[i].mse;
+    channel.value += sums[i].value;
+    channel.bias += sums[i].bias;
+  }
+  return summarize(channels, target.num_valid(), ssim_weight, exposure);
+}
+
+PhotometricLoss summarize(const LossSums (&channels)[3], int num_valid, float ssim_weight, const Exposure& exposure) {
   PhotometricLoss result;
   double l1 = 0, ssim = 0, mse = 0;
   for (size_t c = 0; c < 3; ++c) {
-    double gain = 0, bias = 0;
-    for (size_t i = c * static_cast<size_t>(bands); i < (c + 1) * static_cast<size_t>(bands); ++i) {
-      l1 += sums[i].l1;
-      ssim += sums[i].ssim;
-      mse += sums[i].mse;
-      gain += sums[i].gain;
-      bias += sums[i].bias;
-    }
+    l1 += channels[c].l1;
+    ssim += channels[c].ssim;
+    mse += channels[c].mse;
+    // From Σ g (gain r + bias) to Σ g r.
     const double g = static_cast<double>(exposure.gain[c]), b = static_cast<double>(exposure.bias[c]);
-    result.exposure_gradient[c] = static_cast<float>(g != 0 ? (gain - b * bias) / g : 0);
-    result.exposure_gradient[3 + c] = static_cast<float>(bias);
+    result.exposure_gradient[c] = static_cast<float>(g != 0 ? (channels[c].value - b * channels[c].bias) / g : 0);
+    result.exposure_gradient[3 + c] = static_cast<float>(channels[c].bias);
   }
-  const double lambda = static_cast<double>(ssim_weight);
+  const double lambda = static_cast<double>(ssim_weight), values = 3.0 * std::max(num_valid, 1);
   result.l1 = static_cast<float>(l1 / values);
   result.ssim = static_cast<float>(ssim / values);
   result.mse = static_cast<float>(mse / values);

@@ -25,6 +25,16 @@ struct PhotometricLoss {
   float exposure_gradient[6] = {};  ///< dL/d(gain rgb, bias rgb).
 };
 
+/// Sums over the pixels of one channel, as the gradient image is made: g = dL/d(compared value), v = that value.
+struct LossSums {
+  double l1 = 0, ssim = 0, mse = 0;
+  double value = 0;  ///< Σ g v
+  double bias = 0;   ///< Σ g
+};
+
+/// The loss from the sums of the three channels over `num_valid` pixels.
+PhotometricLoss summarize(const LossSums (&channels)[3], int num_valid, float ssim_weight, const Exposure& exposure);
+
 /// Photometric loss and its gradient image, fused. SSIM: 11x11 gaussian window of σ 1.5, zero padding, per channel,
 /// C1 = 0.01², C2 = 0.03²; pixels without data are zero in both images and do not count. Keeps its buffers.
 class LossFunction {

@@ -16,7 +16,7 @@
 namespace photoslam::splatting {
 namespace {
 
-/// Calls f(row) for every row of per-gaussian data of a block, whatever its type.
+/// Calls f(row) for every row of per-gaussian data of a block but its origins, whatever its type.
 template <class BlockType, class F>
 void for_each_row(BlockType& block, F&& f) {
   for (auto& values : block.parameters) f(values);
@@ -31,7 +31,7 @@ void for_each_row(BlockType& block, F&& f) {
   f(block.births);
 }
 
-constexpr int kWords = 3 * row::kCount + 7;  // of one gaussian, all rows
+constexpr int kWords = 3 * row::kCount + 8;  // of one gaussian, all rows
 
 /// One gaussian with everything that belongs to it, as 32-bit words.
 using Record = std::array<uint32_t, kWords>;
@@ -40,6 +40,7 @@ Record take(const Block& block, int lane) {
   Record record;
   size_t i = 0;
   for_each_row(block, [&](const auto& values) { record[i++] = std::bit_cast<uint32_t>(values[lane]); });
+  record[i] = block.origins[lane];
   return record;
 }
 
@@ -48,6 +49,7 @@ void put(Block& block, int lane, const Record& record) {
   for_each_row(block, [&](auto& values) {
     values[lane] = std::bit_cast<std::remove_reference_t<decltype(values[lane])>>(record[i++]);
   });
+  block.origins[lane] = record[i];
 }
 
 void clear_lane(Block& block, int lane) { put(block, lane, Record{}); }
@@ -107,6 +109,7 @@ std::vector<size_t> GaussianModel::add(int anchor, std::span<const Gaussian> gau
   }
   if (!indices.empty()) update_bounds(own.back());
   size_ += gaussians.size();
+  changed_ = true;
   return indices;
 }
 
@@ -116,7 +119,9 @@ size_t GaussianModel::size(int anchor) const {
   return count;
 }
 
-void GaussianModel::update_bounds(size_t index) {
+void GaussianModel::update_bounds(size_t index) { renew_bounds(index); }
+
+void GaussianModel::renew_bounds(size_t index) const {
   // Column-wise over the rows, kColumns at a time: compilers turn that into vectors.
   constexpr int kColumns = 16;
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -159,7 +164,8 @@ bool GaussianModel::contains(size_t index) const {
 }
 
 Gaussian GaussianModel::get(size_t index) const {
-  const Block& block = this->block(index / kBlockSize);
+  fetch(kParameters);
+  const Block& block = *blocks_[index / kBlockSize];
   const size_t lane = index % kBlockSize;
   Gaussian g;
   for (int i = 0; i < 3; ++i) g.mean[i] = block.parameters[row::kMean + i][lane];
@@ -186,7 +192,8 @@ void GaussianModel::reset_optimizer(size_t index) {
 }
 
 Statistics GaussianModel::statistics(size_t index) const {
-  const Block& block = this->block(index / kBlockSize);
+  fetch(kStatistics);
+  const Block& block = *blocks_[index / kBlockSize];
   const size_t lane = index % kBlockSize;
   return {block.gradient[lane], block.weight[lane], block.max_weight[lane], block.visible[lane]};
 }
@@ -195,6 +202,9 @@ void GaussianModel::reset_statistics() {
   for (const auto& block : blocks_)
     for (auto* values : {block->gradient, block->weight, block->max_weight, block->visible})
       std::fill_n(values, kBlockSize, 0.0f);
+  if (!remote_) return;
+  current_ |= kStatistics;
+  changed_ = statistics_reset_ = true;
 }
 
 size_t GaussianModel::remove_if(const std::function<bool(size_t)>& predicate) {
@@ -223,6 +233,7 @@ size_t GaussianModel::remove_if(const std::function<bool(size_t)>& predicate) {
     }
   }
   size_ -= removed;
+  changed_ = changed_ || removed > 0;
 
   std::vector<std::unique_ptr<Block>> kept;
   for (std::vector<uint32_t>& own : blocks_of_anchor_) own.clear();
@@ -244,7 +255,7 @@ void GaussianModel::rescale_anchor(int anchor, float factor) {
   PHOTOSLAM_CHECK(factor > 0, "factor {}", factor);
   const float log_factor = std::log(factor);
   for (uint32_t b : blocks_of_anchor_[static_cast<size_t>(anchor)]) {
-    Block& block = *blocks_[b];
+    Block& block = this->block(b);
     for (int lane = 0; lane < block.count; ++lane) {
       for (int i = 0; i < 3; ++i) block.parameters[row::kMean + i][lane] *= factor;
       for (int i = 0; i < 3; ++i) block.parameters[row::kLogScale + i][lane] += log_factor;
@@ -257,6 +268,8 @@ void GaussianModel::rescale_anchor(int anchor, float factor) {
 }
 
 void GaussianModel::sort_spatially() {
+  fetch(kParameters);
+  changed_ = true;
   for (const std::vector<uint32_t>& own : blocks_of_anchor_) {
     float low[3], high[3];
     std::fill_n(low, 3, std::numeric_limits<float>::infinity());
@@ -307,6 +320,11 @@ void GaussianModel::set_sh_degree(int degree) {
 }
 
 void GaussianModel::serialize(Archive& a) {
+  if (a.reading()) {
+    forget_remote();
+  } else {
+    fetch(kAll);
+  }
   uint64_t num_anchors = blocks_of_anchor_.size(), num_blocks = blocks_.size();
   a(sh_degree_, num_anchors, num_blocks);
   if (a.reading()) {
@@ -333,6 +351,94 @@ void GaussianModel::serialize(Archive& a) {
     blocks_of_anchor_[static_cast<size_t>(block.anchor)].push_back(static_cast<uint32_t>(b));
     size_ += static_cast<size_t>(block.count);
   }
+}
+
+static_assert(offsetof(Block, first_moments) == sizeof(float) * kBlockSize * row::kOptimizer);
+static_assert(offsetof(Block, gradient) == sizeof(float) * kBlockSize * row::kStatistics);
+static_assert(offsetof(Block, tags) == sizeof(float) * kBlockSize * row::kTableRows);
+
+void GaussianModel::fetch_rows(int first_row, int num_rows) const {
+  const auto rows = static_cast<size_t>(num_rows);
+  std::vector<float> fetched(remote_blocks_ * rows * kBlockSize);
+  if (!remote_->fetch(first_row, num_rows, fetched.data())) return forget_remote();
+  for (const auto& block : blocks_) {
+    float* const to = table(*block) + first_row * kBlockSize;
+    for (int lane = 0; lane < block->count; ++lane) {
+      if (block->origins[lane] == 0) continue;
+      const size_t slot = block->origins[lane] - 1;
+      const float* from = &fetched[slot / kBlockSize * rows * kBlockSize + slot % kBlockSize];
+      for (size_t r = 0; r < rows; ++r) to[r * kBlockSize + static_cast<size_t>(lane)] = from[r * kBlockSize];
+    }
+  }
+}
+
+void GaussianModel::fetch(int parts) const {
+  if (!remote_) return;
+  const int missing = parts & ~current_;
+  current_ |= missing;
+  if ((missing & kParameters) != 0) fetch_rows(0, row::kOptimizer);
+  if (remote_ && (missing & kOptimizer) != 0) fetch_rows(row::kOptimizer, row::kStatistics - row::kOptimizer);
+  if (remote_ && (missing & kStatistics) != 0) fetch_rows(row::kStatistics, row::kTableRows - row::kStatistics);
+  if ((missing & kParameters) == 0) return;
+  for (size_t b = 0; b < blocks_.size(); ++b) renew_bounds(b);
+}
+
+/// From now on the values of this block are those of the host.
+void GaussianModel::claim(size_t b) {
+  fetch(kAll);
+  std::fill_n(blocks_[b]->origins, kBlockSize, 0u);
+  changed_ = true;
+}
+
+void GaussianModel::attach(std::shared_ptr<RemoteModel> remote) const {
+  bring_home();
+  remote_ = std::move(remote);
+  remote_blocks_ = 0;
+  changed_ = true;
+}
+
+void GaussianModel::bring_home() const {
+  fetch(kAll);
+  forget_remote();
+}
+
+void GaussianModel::forget_remote() const {
+  for (const auto& block : blocks_) std::fill_n(block->origins, kBlockSize, 0u);
+  remote_.reset();
+  remote_blocks_ = 0;
+  current_ = kAll;
+  statistics_reset_ = false;
+}
+
+std::optional<ModelChanges> GaussianModel::changes() const {
+  if (!changed_) return {};
+  ModelChanges changes;
+  changes.clear_statistics = statistics_reset_;
+  changes.sources.assign(index_end(), ModelChanges::kFromNowhere);
+  for (size_t b = 0; b < blocks_.size(); ++b) {
+    const Block& block = *blocks_[b];
+    changes.anchors.push_back(block.anchor);
+    changes.counts.push_back(block.count);
+    for (int lane = 0; lane < block.count; ++lane) {
+      const size_t slot = b * kBlockSize + static_cast<size_t>(lane);
+      if (block.origins[lane] != 0) {
+        changes.sources[slot] = block.origins[lane] - 1;
+        changes.moves = changes.moves || changes.sources[slot] != slot;
+        continue;
+      }
+      changes.sources[slot] = ModelChanges::kFromHost + static_cast<uint32_t>(changes.records.size() / row::kTableRows);
+      for (int r = 0; r < row::kTableRows; ++r) changes.records.push_back(table(block)[r * kBlockSize + lane]);
+    }
+  }
+  return changes;
+}
+
+void GaussianModel::exchanged() const {
+  for (size_t b = 0; b < blocks_.size(); ++b)
+    for (int lane = 0; lane < blocks_[b]->count; ++lane)
+      blocks_[b]->origins[lane] = static_cast<uint32_t>(b * kBlockSize + static_cast<size_t>(lane) + 1);
+  remote_blocks_ = blocks_.size();
+  changed_ = statistics_reset_ = false;
 }
 
 }  // namespace photoslam::splatting

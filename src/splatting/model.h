@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -42,11 +43,41 @@ struct alignas(64) Block {
   float visible[kBlockSize];
   uint32_t tags[kBlockSize];
   uint32_t births[kBlockSize];
+  uint32_t origins[kBlockSize];  ///< Slot + 1 in the remote copy as of the last exchange; 0: the host has the values.
   int32_t anchor;
   int32_t count;
   float center[3];  ///< Bounding sphere of the sane means, in the anchor frame [m].
   float radius;     ///< [m]
   float max_scale;  ///< Largest standard deviation in the block [m].
+};
+
+/// Rows of a block as one table of 64 columns: parameters, moments and step counts, statistics.
+namespace row {
+inline constexpr int kOptimizer = kCount;
+inline constexpr int kStatistics = 3 * kCount + 1;
+inline constexpr int kTableRows = kStatistics + 4;
+}  // namespace row
+
+/// Row r, lane i of that table: table(block)[64 r + i].
+inline const float* table(const Block& block) { return reinterpret_cast<const float*>(&block); }
+inline float* table(Block& block) { return reinterpret_cast<float*>(&block); }
+
+/// The values of a model on a GPU.
+class RemoteModel {
+ public:
+  virtual ~RemoteModel() = default;
+  /// Rows [first, first + count) of the table of every block: [blocks, count, 64]; false: they are lost.
+  virtual bool fetch(int first_row, int num_rows, float* rows) = 0;
+};
+
+/// What a remote copy has to do to become like the model.
+struct ModelChanges {
+  static constexpr uint32_t kFromHost = 0x80000000u, kFromNowhere = 0xffffffffu;
+  std::vector<uint32_t> sources;  ///< [blocks, 64] Slot of the copy, kFromHost + index of a record, or kFromNowhere.
+  std::vector<int32_t> anchors, counts;  // [blocks]
+  std::vector<float> records;            // [records, row::kTableRows]
+  bool moves = false;                    ///< Some gaussian's slot is another than in the copy.
+  bool clear_statistics = false;
 };
 
 /// The gaussians of a map, grouped by the anchor (keyframe) in whose frame they live.
@@ -77,14 +108,20 @@ class GaussianModel {
   size_t num_blocks() const { return blocks_.size(); }
   /// One past the largest index: 64 * num_blocks().
   size_t index_end() const { return blocks_.size() * kBlockSize; }
-  const Block& block(size_t i) const { return *blocks_[i]; }
+  const Block& block(size_t i) const {
+    if (remote_) fetch(kAll);
+    return *blocks_[i];
+  }
   /// Whoever changes means or scales through this calls update_bounds(i) afterwards.
-  Block& block(size_t i) { return *blocks_[i]; }
+  Block& block(size_t i) {
+    if (remote_) claim(i);
+    return *blocks_[i];
+  }
   void update_bounds(size_t block);
 
   /// Is there a gaussian at this index (lanes of partial blocks are not)?
   bool contains(size_t index) const;
-  int anchor(size_t index) const { return block(index / kBlockSize).anchor; }
+  int anchor(size_t index) const { return blocks_[index / kBlockSize]->anchor; }
   Gaussian get(size_t index) const;
   /// Replaces the parameters; keeps optimiser state and statistics.
   void set(size_t index, const Gaussian& gaussian);
@@ -93,9 +130,9 @@ class GaussianModel {
 
   Statistics statistics(size_t index) const;
   void reset_statistics();
-  uint32_t tag(size_t index) const { return block(index / kBlockSize).tags[index % kBlockSize]; }
-  void set_tag(size_t index, uint32_t tag) { block(index / kBlockSize).tags[index % kBlockSize] = tag; }
-  uint32_t birth(size_t index) const { return block(index / kBlockSize).births[index % kBlockSize]; }
+  uint32_t tag(size_t index) const { return blocks_[index / kBlockSize]->tags[index % kBlockSize]; }
+  void set_tag(size_t index, uint32_t tag) { blocks_[index / kBlockSize]->tags[index % kBlockSize] = tag; }
+  uint32_t birth(size_t index) const { return blocks_[index / kBlockSize]->births[index % kBlockSize]; }
 
   /// Calls visit(index) for every gaussian, in order.
   template <class Visit>
@@ -124,13 +161,41 @@ class GaussianModel {
   int sh_degree() const { return sh_degree_; }
   void set_sh_degree(int degree);
 
+  // While a GPU trains or draws the model, the newest values are there. Every function above fetches what it needs,
+  // once until the next iteration, so a model that has a remote copy is for one thread only.
+
+  /// Takes a copy that holds nothing yet.
+  void attach(std::shared_ptr<RemoteModel> remote) const;
+  const RemoteModel* remote() const { return remote_.get(); }
+  /// What the copy has to do; nothing: it is like the model. Call exchanged() when it is done.
+  std::optional<ModelChanges> changes() const;
+  void exchanged() const;
+  /// The copy's values are newer now.
+  void trained_remotely() { current_ = 0; }
+  /// Fetches everything and forgets the copy. Values that are lost there are those fetched last.
+  void bring_home() const;
+
  private:
+  enum Part { kParameters = 1, kOptimizer = 2, kStatistics = 4, kAll = 7 };
+
   Block& append_block(int anchor);
+  void fetch(int parts) const;
+  void fetch_rows(int first_row, int num_rows) const;
+  void forget_remote() const;
+  void claim(size_t block);
+  void renew_bounds(size_t block) const;
 
   std::vector<std::unique_ptr<Block>> blocks_;
   std::vector<std::vector<uint32_t>> blocks_of_anchor_;
   size_t size_ = 0;
   int sh_degree_ = kMaxShDegree;
+
+  // Values and their remote copy are one thing in two places: a const model may fetch them.
+  mutable std::shared_ptr<RemoteModel> remote_;
+  mutable size_t remote_blocks_ = 0;
+  mutable int current_ = kAll;  // parts whose values are also here
+  mutable bool changed_ = false;
+  mutable bool statistics_reset_ = false;
 };
 
 }  // namespace photoslam::splatting

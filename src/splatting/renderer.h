@@ -21,6 +21,9 @@ struct RenderResult {
   int visible = 0;           ///< Gaussians that touch at least one tile.
 };
 
+/// Makes room for an image of the camera's size.
+void resize(RenderResult& result, const Camera& camera);
+
 /// Wall time of the stages of one call [ms].
 struct StageTimes {
   double project = 0;   ///< Culling, projection, colours.
@@ -32,10 +35,13 @@ struct StageTimes {
   double total() const { return project + sort + forward + loss + backward + update; }
 };
 
+class Gpu;
+
 /// Draws gaussians. Keeps its buffers between calls; the image is the same at any concurrency.
 class Renderer {
  public:
-  Renderer();
+  /// On a GPU, as long as that works, or (null) on the CPU.
+  explicit Renderer(std::shared_ptr<Gpu> gpu = nullptr);
   ~Renderer();
   Renderer(Renderer&&) noexcept;
   Renderer& operator=(Renderer&&) noexcept;

@@ -26,6 +26,7 @@ void TargetImage::set_depth(std::span<const uint16_t> depth, float unit) {
   PHOTOSLAM_CHECK(unit > 0, "unit {}", unit);
   depth_.assign(depth.begin(), depth.end());
   depth_unit_ = unit;
+  remote_.reset();
   if (has_mask())
     for (size_t i = 0; i < depth_.size(); ++i)
       if (mask_[i] == 0) depth_[i] = 0;

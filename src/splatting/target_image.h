@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace photoslam::splatting {
@@ -35,6 +37,10 @@ class TargetImage {
   int num_valid() const { return num_valid_; }
   int num_depth() const { return num_depth_; }
 
+  /// What a GPU remembers of this image: lives as long as the image stays as it is.
+  const std::shared_ptr<void>& remote() const { return remote_; }
+  void set_remote(std::shared_ptr<void> remote) const { remote_ = std::move(remote); }
+
  private:
   int width_ = 0, height_ = 0;
   std::vector<uint8_t> planes_;
@@ -43,6 +49,7 @@ class TargetImage {
   float depth_unit_ = 0;
   int num_valid_ = 0;
   int num_depth_ = 0;
+  mutable std::shared_ptr<void> remote_;
 };
 
 }  // namespace photoslam::splatting

@@ -3,23 +3,28 @@
 #include "splatting/trainer.h"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "base/check.h"
 #include "base/clock.h"
 #include "splatting/cpu/forward.h"
 #include "splatting/cpu/rasterize.h"
 #include "splatting/cpu/update.h"
+#include "splatting/gpu.h"
 
 namespace photoslam::splatting {
 
 struct Trainer::State {
+  std::shared_ptr<Gpu> gpu;
+  bool gpu_drew = false;      // the image drawn last …
+  bool image_unread = false;  // … which is fetched when somebody asks for it
   Frame frame;
   RenderResult rendered;
   LossFunction loss;
   std::vector<float> dl_drgb, dl_ddepth, dl_dalpha;
 };
 
-Trainer::Trainer() : state_(std::make_unique<State>()) {}
+Trainer::Trainer(std::shared_ptr<Gpu> gpu) : state_(std::make_unique<State>()) { state_->gpu = std::move(gpu); }
 Trainer::~Trainer() = default;
 Trainer::Trainer(Trainer&&) noexcept = default;
 Trainer& Trainer::operator=(Trainer&&) noexcept = default;
@@ -29,6 +34,15 @@ StepResult Trainer::step(GaussianModel& model, const View& view, const TargetIma
   PHOTOSLAM_CHECK(target.width() == view.camera.width && target.height() == view.camera.height,
                   "target {}x{}, camera {}x{}", target.width(), target.height(), view.camera.width, view.camera.height);
   State& s = *state_;
+  s.gpu_drew = s.image_unread = false;
+  if (s.gpu) {
+    if (const auto done = s.gpu->step(model, view, target, options)) {
+      resize(s.rendered, view.camera);
+      s.gpu_drew = s.image_unread = true;
+      return *done;
+    }
+  }
+  model.bring_home();  // wherever another trainer has left it
   StepResult result;
   render_forward(model, view, options.render, executor, s.frame, s.rendered, result.times);
   result.visible = s.rendered.visible;
@@ -61,6 +75,13 @@ StepResult Trainer::step(GaussianModel& model, const View& view, const TargetIma
 
 void Trainer::forward(const GaussianModel& model, const View& view, const RenderOptions& options, Executor& executor) {
   StageTimes times;
+  State& s = *state_;
+  s.gpu_drew = s.image_unread = false;
+  if (s.gpu && s.gpu->forward(model, view, options, true, times, s.rendered.visible)) {
+    resize(s.rendered, view.camera);
+    s.gpu_drew = s.image_unread = true;
+    return;
+  }
   render_forward(model, view, options, executor, state_->frame, state_->rendered, times);
 }
 
@@ -73,10 +94,21 @@ void Trainer::backward(const GaussianModel& model, std::span<const float> dl_drg
                   plane);
   PHOTOSLAM_CHECK(dl_dalpha.empty() || dl_dalpha.size() == plane, "{} alpha gradients, {} pixels", dl_dalpha.size(),
                   plane);
+  if (s.gpu_drew) {
+    if (!s.gpu->backward(model, dl_drgb, dl_ddepth, dl_dalpha, gradients))
+      throw std::runtime_error("the GPU failed between forward and backward: " + s.gpu->failure());
+    return;
+  }
   rasterize_backward(executor, s.frame, s.rendered, {dl_drgb, dl_ddepth, dl_dalpha});
   dense_gradients(executor, s.frame, model, gradients);
 }
 
-const RenderResult& Trainer::rendered() const { return state_->rendered; }
+const RenderResult& Trainer::rendered() const {
+  State& s = *state_;
+  if (s.image_unread && !s.gpu->read_image(s.rendered))
+    throw std::runtime_error("the GPU failed before its image was read: " + s.gpu->failure());
+  s.image_unread = false;
+  return s.rendered;
+}
 
 }  // namespace photoslam::splatting

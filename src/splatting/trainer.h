@@ -60,11 +60,14 @@ struct Gradients {
   }
 };
 
+class Gpu;
+
 /// Fits gaussians to images: projects, sorts, blends, compares, goes back and updates what was visible.
 /// Keeps its buffers between calls. Results are the same at any concurrency.
 class Trainer {
  public:
-  Trainer();
+  /// On a GPU, as long as that works, or (null) on the CPU.
+  explicit Trainer(std::shared_ptr<Gpu> gpu = nullptr);
   ~Trainer();
   Trainer(Trainer&&) noexcept;
   Trainer& operator=(Trainer&&) noexcept;

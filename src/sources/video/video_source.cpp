@@ -2,11 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sources/video/video_source.h"
 
-#include <dlfcn.h>
-
 #include <array>
 
 #include "base/check.h"
+#include "base/module.h"
 #include "sources/calibration/calibration.h"
 #include "sources/sensor_choice.h"
 #include "sources/video/video_plugin.h"
@@ -16,32 +15,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kModule = "photoslam_video.so";
-
-/// Loads the decoder. It stays loaded: its own threads may outlive a reader.
 Result<const PhotoslamVideoApi*> load_decoder() {
-  std::error_code code;
-  const fs::path program = fs::read_symlink("/proc/self/exe", code).parent_path();
-  std::string tried;
-  for (const fs::path& folder : {program, program.parent_path(), program.parent_path() / "lib" / "photoslam"}) {
-    const fs::path path = folder / kModule;
-    if (!fs::exists(path, code)) continue;
-    void* const module = ::dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (module == nullptr) {
-      tried = fmt::format(" ({})", ::dlerror());
-      continue;
-    }
-    // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): what dlsym returns is a function
-    const auto entry = reinterpret_cast<PhotoslamVideoEntry>(::dlsym(module, "photoslam_video_api"));
-    const PhotoslamVideoApi* const api = entry != nullptr ? entry() : nullptr;
-    if (api != nullptr && api->version == kPhotoslamVideoApiVersion) return api;
-    tried = " (it is of another version)";
-  }
+  const auto entry = find_in_module("photoslam_video.so", "photoslam_video_api");
+  std::string why = entry ? "photoslam_video.so is of another version" : entry.error().message;
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): what a module exports is a function
+  const PhotoslamVideoApi* const api = entry ? reinterpret_cast<PhotoslamVideoEntry>(*entry)() : nullptr;
+  if (api != nullptr && api->version == kPhotoslamVideoApiVersion) return api;
   return error(
-      "no usable {} beside the program{}; build it with libavformat-dev, libavcodec-dev and libswscale-dev installed, "
-      "or "
-      "turn the video into images: ffmpeg -i VIDEO folder/%06d.png",
-      kModule, tried);
+      "{}; build it with libavformat-dev, libavcodec-dev and libswscale-dev installed, or turn the video into images: "
+      "ffmpeg -i VIDEO folder/%06d.png",
+      why);
 }
 
 class VideoReader {

@@ -169,12 +169,7 @@ namespace photoslam::splatting {
 HWY_EXPORT(rasterize_tile);
 
 void rasterize(Executor& executor, Frame& frame, RenderResult& result) {
-  const size_t plane = static_cast<size_t>(frame.width) * static_cast<size_t>(frame.height);
-  result.width = frame.width;
-  result.height = frame.height;
-  result.rgb.resize(3 * plane);
-  result.depth.resize(plane);
-  result.alpha.resize(plane);
+  resize(result, {.width = frame.width, .height = frame.height});
   result.visible = frame.num_visible;
   frame.sorters.resize(static_cast<size_t>(executor.concurrency()));
   executor.for_each(frame.num_tiles(), [&](int tile, int worker) {

@@ -20,15 +20,15 @@ class DeviceError : public std::runtime_error {
   bool out_of_memory;
 };
 
-/// How the model on the device is to change. Slot = 64 * block + lane; values as in model_kernels.h.
+/// ModelChanges as plain pointers.
 struct Arrangement {
   uint32_t num_blocks = 0;
   const uint32_t* sources = nullptr;  // [num_blocks, 64]
   const int32_t* anchors = nullptr;   // [num_blocks]
   const int32_t* counts = nullptr;    // [num_blocks]
-  const float* records = nullptr;     // [num_records, kNumRows]
+  const float* records = nullptr;     // [num_records, row::kTableRows]
   uint32_t num_records = 0;
-  bool moves = false;  ///< A slot's values come from another slot.
+  bool moves = false;
   bool clear_statistics = false;
 };
 

@@ -113,13 +113,13 @@ void Engine<Device>::arrange(const Arrangement& a) {
   sources.take(slots);
   anchors.take(a.num_blocks);
   counts.take(a.num_blocks);
-  records.take(size_t{a.num_records} * kNumRows);
+  records.take(size_t{a.num_records} * row::kTableRows);
   const bool in_place = !a.moves && a.num_blocks <= blocks_.size();
   if (!in_place) target.take(a.num_blocks + a.num_blocks / 8);
   device_.upload(sources.data(), a.sources, slots * sizeof(uint32_t));
   device_.upload(anchors.data(), a.anchors, a.num_blocks * sizeof(int32_t));
   device_.upload(counts.data(), a.counts, a.num_blocks * sizeof(int32_t));
-  device_.upload(records.data(), a.records, size_t{a.num_records} * kNumRows * sizeof(float));
+  device_.upload(records.data(), a.records, size_t{a.num_records} * row::kTableRows * sizeof(float));
   device_.launch(static_cast<int>(a.num_blocks),
                  RearrangeKernel{blocks_.data(), in_place ? blocks_.data() : target.data(), sources.data(),
                                  anchors.data(), counts.data(), records.data()});
@@ -277,6 +277,7 @@ void Engine<Device>::unblend(bool with_depth, bool with_alpha) {
 }
 
 template <class Device>
+// NOLINTNEXTLINE(readability-non-const-parameter): the kernel writes to it
 void Engine<Device>::update_model(const UpdateConstants& constants, bool update, float* dense) {
   Results* const r = results_.data();
   pose_.reserve(6 * std::max<size_t>(num_blocks_, 1));

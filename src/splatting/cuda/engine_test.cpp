@@ -51,13 +51,13 @@ struct OnDevice {
     alpha.resize(plane);
     engine.read_image({rgb.data(), depth.data(), alpha.data()});
   }
-  /// All rows of the blocks: [num_blocks, kNumRows, 64].
+  /// All rows of the blocks: [num_blocks, row::kTableRows, 64].
   std::vector<float> rows() {
-    std::vector<float> values(num_blocks * kNumRows * kBlockSize);
-    engine.fetch(0, kNumRows, values.data());
+    std::vector<float> values(num_blocks * row::kTableRows * kBlockSize);
+    engine.fetch(0, row::kTableRows, values.data());
     return values;
   }
-  static size_t row_at(size_t index, int row, int num_rows = kNumRows) {
+  static size_t row_at(size_t index, int row, int num_rows = row::kTableRows) {
     return (index / kBlockSize * static_cast<size_t>(num_rows) + static_cast<size_t>(row)) * kBlockSize +
            index % kBlockSize;
   }
@@ -337,10 +337,10 @@ TEST(CudaEngine, StepIsAdamOnTheGradientsOfTheLoss) {
     for (const size_t index : scene.indices) {
       const auto now = [&](int row) { return static_cast<double>(after[OnDevice::row_at(index, row)]); };
       const auto was = [&](int row) { return static_cast<double>(before[OnDevice::row_at(index, row)]); };
-      const bool is_visible = now(kStatisticsRow + 3) > was(kStatisticsRow + 3);
+      const bool is_visible = now(row::kStatistics + 3) > was(row::kStatistics + 3);
       num_visible += is_visible ? 1 : 0;
       visible[index] += is_visible ? 1 : 0;
-      EXPECT_EQ(now(kUpdatesRow), visible[index]);
+      EXPECT_EQ(now(row::kStatistics - 1), visible[index]);
       for (int r = 0; r < row::kCount; ++r) {
         const size_t at = OnDevice::row_at(index, r, row::kCount);
         const double g = static_cast<double>(gradients[at]), rate = static_cast<double>(lesson.constants.rates[r]);
@@ -474,12 +474,12 @@ TEST(CudaEngine, ArrangementsMoveGaussiansWithAllThatBelongsToThem) {
   OnDevice device(scene);
   const std::vector<float> before = device.rows();
   // Backwards in three blocks, every fifth dropped, one from the host; then one more block in place.
-  std::vector<uint32_t> sources(3 * kBlockSize, kFromNowhere);
+  std::vector<uint32_t> sources(3 * kBlockSize, ModelChanges::kFromNowhere);
   for (uint32_t i = 0; i < 150; ++i)
     if (i % 5 != 0) sources[i] = 199 - i;
-  std::vector<float> records(kNumRows);
+  std::vector<float> records(row::kTableRows);
   std::iota(records.begin(), records.end(), 1.0f);
-  sources[0] = kFromHost;
+  sources[0] = ModelChanges::kFromHost;
   const std::vector<int32_t> anchors = {0, 0, 0, 0}, counts = {64, 64, 22, 1};
   Arrangement a;
   a.num_blocks = 3;
@@ -493,17 +493,17 @@ TEST(CudaEngine, ArrangementsMoveGaussiansWithAllThatBelongsToThem) {
   device.num_blocks = 3;
   const auto check = [&](const std::vector<float>& after) {
     for (uint32_t i = 0; i < 3 * kBlockSize; ++i)
-      for (int r = 0; r < kNumRows; ++r) {
-        const float want = i == 0                       ? static_cast<float>(r + 1)
-                           : sources[i] == kFromNowhere ? 0.0f
-                                                        : before[OnDevice::row_at(sources[i], r)];
+      for (int r = 0; r < row::kTableRows; ++r) {
+        const float want = i == 0                                     ? static_cast<float>(r + 1)
+                           : sources[i] == ModelChanges::kFromNowhere ? 0.0f
+                                                                      : before[OnDevice::row_at(sources[i], r)];
         ASSERT_EQ(after[OnDevice::row_at(i, r)], want) << i << " row " << r;
       }
   };
   check(device.rows());
-  std::vector<uint32_t> stay(4 * kBlockSize, kFromNowhere);
+  std::vector<uint32_t> stay(4 * kBlockSize, ModelChanges::kFromNowhere);
   std::iota(stay.begin(), stay.begin() + 3 * kBlockSize, 0u);
-  stay[3 * kBlockSize] = kFromHost;
+  stay[3 * kBlockSize] = ModelChanges::kFromHost;
   a.num_blocks = 4;
   a.sources = stay.data();
   a.moves = false;

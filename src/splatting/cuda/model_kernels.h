@@ -6,21 +6,6 @@
 
 namespace photoslam::splatting::cuda {
 
-/// A block is a table of rows of 64 floats: parameters, moments and step counts, statistics; others follow.
-inline constexpr int kFirstMomentRow = row::kCount;
-inline constexpr int kUpdatesRow = 3 * row::kCount;
-inline constexpr int kStatisticsRow = kUpdatesRow + 1;
-inline constexpr int kNumRows = kStatisticsRow + 4;
-static_assert(offsetof(Block, first_moments) == sizeof(float) * kBlockSize * kFirstMomentRow);
-static_assert(offsetof(Block, updates) == sizeof(float) * kBlockSize * kUpdatesRow);
-static_assert(offsetof(Block, gradient) == sizeof(float) * kBlockSize * kStatisticsRow);
-static_assert(offsetof(Block, tags) == sizeof(float) * kBlockSize * kNumRows);
-
-/// Where the values of a slot come from: a slot of the model as it was, kFromHost + i: record i of the host, or
-/// nowhere: zeros.
-inline constexpr uint32_t kFromHost = 0x80000000u;
-inline constexpr uint32_t kFromNowhere = 0xffffffffu;
-
 /// Rearranges the model: one thread block per block of the new model, one thread per slot. `from` and `to` may be the
 /// same when no slot moves: then what stays is not touched.
 struct RearrangeKernel {
@@ -31,7 +16,7 @@ struct RearrangeKernel {
   const uint32_t* sources;  ///< [slots]
   const int32_t* anchors;   ///< [blocks]
   const int32_t* counts;    ///< [blocks]
-  const float* records;     ///< [records, kNumRows]
+  const float* records;     ///< [records, row::kTableRows]
 
   template <class Group>
   PHOTOSLAM_DEVICE void operator()(Group& group, Shared&) const {
@@ -44,14 +29,14 @@ struct RearrangeKernel {
     }
     if (source == slot && from == to) return;
     float* out = &block.parameters[0][0] + lane;
-    if (source == kFromNowhere) {
-      for (int r = 0; r < kNumRows; ++r) out[r * kBlockSize] = 0;
-    } else if (source >= kFromHost) {
-      const float* record = records + size_t{source - kFromHost} * kNumRows;
-      for (int r = 0; r < kNumRows; ++r) out[r * kBlockSize] = record[r];
+    if (source == ModelChanges::kFromNowhere) {
+      for (int r = 0; r < row::kTableRows; ++r) out[r * kBlockSize] = 0;
+    } else if (source >= ModelChanges::kFromHost) {
+      const float* record = records + size_t{source - ModelChanges::kFromHost} * row::kTableRows;
+      for (int r = 0; r < row::kTableRows; ++r) out[r * kBlockSize] = record[r];
     } else {
       const float* in = &from[source / kBlockSize].parameters[0][0] + source % kBlockSize;
-      for (int r = 0; r < kNumRows; ++r) out[r * kBlockSize] = in[r * kBlockSize];
+      for (int r = 0; r < row::kTableRows; ++r) out[r * kBlockSize] = in[r * kBlockSize];
     }
   }
 };

@@ -41,7 +41,7 @@ std::vector<T> to_host(TestDevice& device, const Array<T, TestDevice>& array, si
 /// Puts a model on an engine, all of it from the host.
 inline void upload_model(const GaussianModel& model, DeviceEngine& engine) {
   const size_t slots = model.index_end();
-  std::vector<uint32_t> sources(slots, kFromNowhere);
+  std::vector<uint32_t> sources(slots, ModelChanges::kFromNowhere);
   std::vector<int32_t> anchors, counts;
   std::vector<float> records;
   for (size_t b = 0; b < model.num_blocks(); ++b) {
@@ -50,8 +50,8 @@ inline void upload_model(const GaussianModel& model, DeviceEngine& engine) {
     counts.push_back(block.count);
     for (int lane = 0; lane < block.count; ++lane) {
       sources[b * kBlockSize + static_cast<size_t>(lane)] =
-          kFromHost + static_cast<uint32_t>(records.size() / kNumRows);
-      for (int r = 0; r < kNumRows; ++r) records.push_back((&block.parameters[0][0])[r * kBlockSize + lane]);
+          ModelChanges::kFromHost + static_cast<uint32_t>(records.size() / row::kTableRows);
+      for (int r = 0; r < row::kTableRows; ++r) records.push_back((&block.parameters[0][0])[r * kBlockSize + lane]);
     }
   }
   Arrangement a;
@@ -60,7 +60,7 @@ inline void upload_model(const GaussianModel& model, DeviceEngine& engine) {
   a.anchors = anchors.data();
   a.counts = counts.data();
   a.records = records.data();
-  a.num_records = static_cast<uint32_t>(records.size() / kNumRows);
+  a.num_records = static_cast<uint32_t>(records.size() / row::kTableRows);
   engine.arrange(a);
 }
 
