@@ -1,7 +1,7 @@
 # Copyright the photoslam authors.
 # SPDX-License-Identifier: Apache-2.0
 # Finds nvcc 12.0 or newer and says how to call it, for module and device tests: PHOTOSLAM_NVCC, empty where there is
-# none, and photoslam_nvcc(<output> SOURCES <file>... OPTIONS <option>...).
+# none, and photoslam_nvcc(<output> SOURCES <file>... [OPTIONS <option>...] [LINK <static library target>...]).
 find_program(PHOTOSLAM_NVCC nvcc HINTS ENV CUDA_HOME ENV CUDA_PATH /usr/local/cuda PATH_SUFFIXES bin)
 set(nvcc_release 0)
 if(PHOTOSLAM_NVCC)
@@ -29,11 +29,9 @@ list(GET nvcc_architectures -1 architecture)
 list(APPEND nvcc_flags -gencode arch=compute_${architecture},code=compute_${architecture})
 
 function(photoslam_nvcc output)
-  cmake_parse_arguments(ARG "" "" "SOURCES;OPTIONS" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "SOURCES;OPTIONS;LINK" ${ARGN})
   get_filename_component(name ${output} NAME)
-  set(commands)
   set(objects)
-  set(depfile)
   foreach(source ${ARG_SOURCES})
     get_filename_component(stem ${source} NAME_WE)
     set(object ${CMAKE_CURRENT_BINARY_DIR}/${name}.${stem}.o)
@@ -46,14 +44,18 @@ function(photoslam_nvcc output)
       VERBATIM)
     list(APPEND objects ${object})
   endforeach()
+  set(libraries)
+  foreach(target ${ARG_LINK})
+    list(APPEND libraries $<TARGET_FILE:${target}>)
+  endforeach()
   set(shared)
   if(output MATCHES "\\.so$")
     set(shared -shared)
   endif()
   add_custom_command(
     OUTPUT ${output}
-    COMMAND ${PHOTOSLAM_NVCC} ${nvcc_flags} ${shared} -cudart static ${objects} -o ${output}
-    DEPENDS ${objects}
+    COMMAND ${PHOTOSLAM_NVCC} ${nvcc_flags} ${shared} -cudart static ${objects} ${libraries} -o ${output}
+    DEPENDS ${objects} ${ARG_LINK}
     COMMENT "Linking ${name}"
     VERBATIM)
 endfunction()

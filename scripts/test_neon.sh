@@ -32,8 +32,8 @@ rule cxx
 rule link
   command = $compiler -static -pthread \$in -o \$out
 RULES
-sources=("$googletest/src/gtest-all.cc" "$googletest/src/gtest_main.cc" src/base/clock.cpp src/base/executor.cpp)
-while IFS= read -r file; do sources+=("$file"); done < <(find src/splatting -name '*.cpp' ! -name '*_benchmark.cpp' ! -path '*/cuda/*' | sort)
+sources=("$googletest/src/gtest-all.cc" "$googletest/src/gtest_main.cc" src/base/clock.cpp src/base/executor.cpp src/base/module.cpp)
+while IFS= read -r file; do sources+=("$file"); done < <(find src/splatting -name '*.cpp' ! -name '*_benchmark.cpp' ! -path '*/cuda/*' ! -path '*/standalone/*' ! -name gpu_test.cpp | sort)
 {
   echo "include $build/rules.ninja"
   objects=()

@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -14,6 +13,7 @@
 #include "commands.h"
 #include "image/convert.h"
 #include "image/resize.h"
+#include "image_size.h"
 #include "io/gaussian_ply.h"
 #include "io/image_file.h"
 #include "photorealistic_mapping/view_geometry.h"
@@ -39,31 +39,15 @@ struct BenchArguments {
   bool json = false;
 };
 
-struct Size {
-  int width = 0, height = 0;
-};
-
-Result<Size> parse_size(const std::string& text) {
-  Size size;
-  const char* end = text.data() + text.size();
-  const auto width = std::from_chars(text.data(), end, size.width);
-  if (width.ec != std::errc{} || width.ptr == end || *width.ptr != 'x') return error("--size {}: expected WxH", text);
-  const auto height = std::from_chars(width.ptr + 1, end, size.height);
-  if (height.ec != std::errc{} || height.ptr != end || size.width < 1 || size.height < 1) {
-    return error("--size {}: expected WxH, as in 480x640", text);
-  }
-  return size;
-}
-
 /// The cameras and their images at the size asked for.
 Result<std::vector<splatting::BenchView>> load_views(const BenchArguments& arguments) {
   const auto cameras = read_transforms_json(arguments.cameras);
   if (!cameras) return cameras.error();
   std::vector<splatting::BenchView> views;
   for (const PosedCamera& posed : *cameras) {
-    Size size{posed.camera.width, posed.camera.height};
+    ImageSize size{posed.camera.width, posed.camera.height};
     if (!arguments.size.empty()) {
-      const auto asked = parse_size(arguments.size);
+      const auto asked = parse_image_size(arguments.size);
       if (!asked) return asked.error();
       size = *asked;
     }

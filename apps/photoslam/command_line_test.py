@@ -99,6 +99,16 @@ class UsageTest(CommandLineTest):
                 self.assert_fails(result, 2, option[0])
                 self.assert_nothing_written()
 
+    def test_synth_of_another_size(self):
+        result = photoslam("synth", "room", "--frames", "1", "--size", "96x54", "--format", "replica", "--output",
+                           self.output)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        camera = json.loads((self.output / "cam_params.json").read_text(encoding="utf-8"))["camera"]
+        self.assertEqual((camera["w"], camera["h"]), (96, 54))
+        self.assertAlmostEqual(camera["fx"] / 96, 525.4 / 640, places=6)
+        for size in ("96", "96x", "x54", "9x9", "96x54x3"):
+            self.assert_fails(photoslam("synth", "room", "--size", size, "--output", self.folder / "o"), 1, "--size")
+
     def test_doctor_finds_the_machine(self):
         result = photoslam("doctor")
         self.assertEqual(result.returncode, 0)

@@ -11,6 +11,7 @@
 
 #include "base/clock.h"
 #include "commands.h"
+#include "image_size.h"
 #include "interrupt.h"
 #include "sources/sensor_choice.h"
 #include "sources/synthetic/mesh_world.h"
@@ -30,6 +31,7 @@ struct SynthArguments {
   bool lossless = false;
   int threads = 0;
   int shrink = 1;
+  std::string size;
   SyntheticOptions options;
 };
 
@@ -64,6 +66,15 @@ bool is_world_name(const std::string& scene) {
   return std::ranges::any_of(worlds, [&](const WorldInfo& world) { return world.name == scene; });
 }
 
+/// The camera with a sensor of another size behind the same optics: as wide a view, more or less high.
+PinholeCamera with_size(const PinholeCamera& camera, ImageSize size) {
+  const double scale = static_cast<double>(size.width) / camera.width;
+  PinholeCamera other{.width = size.width, .height = size.height, .fx = scale * camera.fx, .fy = scale * camera.fy};
+  other.cx = scale * (camera.cx + 0.5) - 0.5;
+  other.cy = 0.5 * (size.height - 1) + scale * (camera.cy - 0.5 * (camera.height - 1));
+  return other;
+}
+
 /// A lens as cameras of this kind have it.
 void mount_lens(const std::string& lens, SyntheticOptions& options) {
   if (lens == "radial") options.distortion = {-0.28, 0.074, 0.0002, -0.0003};
@@ -78,6 +89,13 @@ Status configure(SynthArguments& arguments, SequenceSettings& settings) {
   const auto sensor = parse_sensor(arguments.sensor);
   if (!sensor) return sensor.error();
   options.sensor = sensor->value_or(SensorKind::rgbd);
+  if (!arguments.size.empty()) {
+    const auto size = parse_image_size(arguments.size);
+    if (!size) return size.error();
+    if (size->width < 64 || size->height < 48 || size->width > 8192 || size->height > 8192)
+      return error("--size {}: between 64x48 and 8192x8192", arguments.size);
+    options.camera = with_size(options.camera, *size);
+  }
   options.camera = shrink(options.camera, arguments.shrink);
   mount_lens(arguments.lens, options);
   if (arguments.format == "auto") arguments.format = options.sensor == SensorKind::stereo ? "euroc" : "tum";
@@ -184,6 +202,7 @@ void add_synth(CommandLine& line) {
   command.add_option("--shrink", a.shrink, "Images smaller by this factor: 2 is 320x240")
       ->check(CLI::Range(1, 8))
       ->capture_default_str();
+  command.add_option("--size", a.size, "Images of another size WxH, equally wide a view [default: 640x480]");
   command.add_option("--fps", o.frames_per_second, "Rate of the camera [Hz]")
       ->check(CLI::Range(1.0, 240.0))
       ->capture_default_str();

@@ -11,6 +11,9 @@
 #include "image/convert.h"
 #include "map/map.h"
 #include "photorealistic_mapping/view_geometry.h"
+#include "splatting/cuda/engine.h"
+#include "splatting/cuda/host_device.h"
+#include "splatting/gpu.h"
 
 namespace photoslam {
 namespace {
@@ -239,6 +242,42 @@ TEST_F(PhotorealisticMapperTest, ContinuesFromAnArchiveAsIfNothingHadHappened) {
   }
   EXPECT_EQ(mapper.gaussians().size(), loaded.gaussians().size());
 }
+
+#ifndef __SANITIZE_THREAD__  // it does not know fibers
+TEST_F(PhotorealisticMapperTest, MapsOnAGpuAsOnTheCpu) {
+  // The GPU is the host in its role: slow, so few and coarse iterations.
+  const auto gpu =
+      std::make_shared<splatting::Gpu>(std::make_unique<splatting::cuda::Engine<splatting::cuda::HostDevice>>(
+                                           splatting::cuda::HostDevice(), uint64_t{1} << 30),
+                                       "host");
+  PhotorealisticOptions options;
+  options.schedule.pyramid_levels = 3;
+  options.reseed_interval = 2;
+  options.densification.interval = 10;
+  options.seeding.cell_px = 24;
+  const MapperSensor sensor{.camera = kCamera, .stereo_baseline_m = kBaseline};
+  PhotorealisticMapper cpu(options, sensor, 1), remote(options, sensor, 1, gpu);
+  for (PhotorealisticMapper* mapper : {&cpu, &remote}) {
+    count_ = 0;
+    world_ = WallWithKeyframes();
+    for (const double x : {0.0, 0.3}) {
+      add(*mapper, at(x), stereo(at(x)));
+      for (int i = 0; i < 4; ++i) mapper->train({}, executor_);
+    }
+  }
+  EXPECT_EQ(gpu->failure(), "");
+  EXPECT_GT(gpu->peak_mb(), 1);
+  EXPECT_NEAR(remote.training_psnr(), cpu.training_psnr(), 0.01);
+  const auto size = static_cast<double>(cpu.gaussians().size());
+  EXPECT_NEAR(static_cast<double>(remote.gaussians().size()), size, 0.01 * size);
+  Archive saved;
+  remote.serialize(saved);
+  PhotorealisticMapper loaded(options, sensor, 99);
+  Archive reader(saved.bytes());
+  loaded.serialize(reader);
+  EXPECT_EQ(loaded.gaussians().size(), remote.gaussians().size());
+}
+#endif
 
 }  // namespace
 }  // namespace photoslam

@@ -4,6 +4,7 @@
 
 #include <cuda_runtime.h>
 
+#include <cstring>
 #include <utility>
 
 #include "splatting/cuda/device_engine.h"
@@ -28,18 +29,21 @@ class CudaDevice {
     check_cuda(cudaDeviceGetAttribute(&has_pools_, cudaDevAttrMemoryPoolsSupported, device_), "asking the GPU");
     check_cuda(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "making a stream");
     for (cudaEvent_t& event : marks_) check_cuda(cudaEventCreate(&event), "making an event");
+    check_cuda(cudaMallocHost(&staging_, kStagingSize), "allocating pinned memory");
   }
   ~CudaDevice() {
     if (stream_ == nullptr) return;
     (void)cudaStreamSynchronize(stream_);
     for (cudaEvent_t event : marks_) (void)cudaEventDestroy(event);
+    (void)cudaFreeHost(staging_);
     (void)cudaStreamDestroy(stream_);
   }
   CudaDevice(CudaDevice&& other) noexcept
       : device_(other.device_),
         num_units_(other.num_units_),
         has_pools_(other.has_pools_),
-        stream_(std::exchange(other.stream_, nullptr)) {
+        stream_(std::exchange(other.stream_, nullptr)),
+        staging_(std::exchange(other.staging_, nullptr)) {
     for (int i = 0; i < kMarks; ++i) marks_[i] = std::exchange(other.marks_[i], nullptr);
   }
   CudaDevice& operator=(CudaDevice&&) = delete;
@@ -65,11 +69,17 @@ class CudaDevice {
     (void)(has_pools_ != 0 ? cudaFreeAsync(data, stream_) : cudaFree(data));
   }
 
-  /// `from` may change as soon as this returns: pageable memory is staged by the driver.
+  /// `from` may change as soon as this returns. Little data is only queued; of much the copy is waited for.
   void upload(void* to, const void* from, size_t bytes) {
     if (bytes == 0) return;
     bind();
+    const bool fits = bytes <= kStagingSize - staged_;
+    if (fits) {
+      from = std::memcpy(staging_ + staged_, from, bytes);
+      staged_ += bytes;
+    }
     check_cuda(cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, stream_), "writing to the GPU");
+    if (!fits) wait();
   }
   void download(void* to, const void* from, size_t bytes) {
     if (bytes == 0) return;
@@ -108,13 +118,19 @@ class CudaDevice {
 
  private:
   static constexpr int kMarks = 8;
+  static constexpr size_t kStagingSize = size_t{1} << 20;
 
   void bind() const { check_cuda(cudaSetDevice(device_), "choosing a GPU"); }
-  void wait() { check_cuda(cudaStreamSynchronize(stream_), "waiting for the GPU"); }
+  void wait() {
+    check_cuda(cudaStreamSynchronize(stream_), "waiting for the GPU");
+    staged_ = 0;
+  }
 
   int device_ = 0, num_units_ = 0, has_pools_ = 0;
   cudaStream_t stream_ = nullptr;
   cudaEvent_t marks_[kMarks] = {};
+  char* staging_ = nullptr;  // pinned: data on its way to the GPU since the last wait
+  size_t staged_ = 0;
 };
 
 }  // namespace photoslam::splatting::cuda

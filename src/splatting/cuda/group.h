@@ -15,6 +15,12 @@
 #define PHOTOSLAM_DEVICE inline
 #endif
 
+#ifdef __CUDA_ARCH__
+#define PHOTOSLAM_UNROLL _Pragma("unroll")
+#else
+#define PHOTOSLAM_UNROLL
+#endif
+
 namespace photoslam::splatting::cuda {
 
 inline constexpr int kWarpSize = 32;

@@ -58,6 +58,7 @@ PHOTOSLAM_DEVICE void block_sums(Group& group, float (&values)[kCount], float (*
 PHOTOSLAM_DEVICE float filter_row(const float* row, int x) {
   float sum = kSsimTap0 * row[x + kHalo];
   const float taps[kSsimRadius] = {kSsimTap1, kSsimTap2, kSsimTap3, kSsimTap4, kSsimTap5};
+  PHOTOSLAM_UNROLL
   for (int k = 1; k <= kSsimRadius; ++k) sum = fmaf(taps[k - 1], row[x + kHalo - k] + row[x + kHalo + k], sum);
   return sum;
 }
@@ -65,6 +66,7 @@ PHOTOSLAM_DEVICE float filter_row(const float* row, int x) {
 PHOTOSLAM_DEVICE float filter_column(const float (*rows)[kTileSize], int x, int y) {
   float sum = kSsimTap0 * rows[y + kHalo][x];
   const float taps[kSsimRadius] = {kSsimTap1, kSsimTap2, kSsimTap3, kSsimTap4, kSsimTap5};
+  PHOTOSLAM_UNROLL
   for (int k = 1; k <= kSsimRadius; ++k) sum = fmaf(taps[k - 1], rows[y + kHalo - k][x] + rows[y + kHalo + k][x], sum);
   return sum;
 }
@@ -106,6 +108,7 @@ struct SsimKernel {
   PHOTOSLAM_DEVICE static void filter_signals(Shared& shared, int x, int y) {
     const float taps[kSsimRadius + 1] = {kSsimTap0, kSsimTap1, kSsimTap2, kSsimTap3, kSsimTap4, kSsimTap5};
     float sum[4] = {0, 0, 0, 0};
+    PHOTOSLAM_UNROLL
     for (int k = -kSsimRadius; k <= kSsimRadius; ++k) {
       const float a = shared.a[y][x + kHalo + k], b = shared.b[y][x + kHalo + k], tap = taps[k < 0 ? -k : k];
       sum[0] = fmaf(tap, a, sum[0]);
