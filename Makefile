@@ -41,7 +41,7 @@ build: ## Install what is missing and build the release binary build/release/pho
 	@scripts/install_dependencies.sh build
 	[ -f build/release/build.ninja ] || scripts/configure.sh release -DPHOTOSLAM_BUILD_TESTS=OFF -DPHOTOSLAM_BUILD_BENCHMARKS=OFF
 	$(call say,Building $(photoslam))
-	@ninja -C build/release -j $(JOBS) photoslam
+	@ninja -C build/release -j $(JOBS) photoslam modules
 
 test: ## Install what is missing, build everything and run all tests
 	@scripts/install_dependencies.sh build test

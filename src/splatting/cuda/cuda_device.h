@@ -23,6 +23,8 @@ inline void check_cuda(cudaError_t code, const char* what) {
 /// host wait for it; the others only queue.
 class CudaDevice {
  public:
+  static constexpr size_t kSpareShare = 8;  ///< Arrays that grow take an eighth more.
+
   CudaDevice() {
     check_cuda(cudaGetDevice(&device_), "choosing a GPU");
     check_cuda(cudaDeviceGetAttribute(&num_units_, cudaDevAttrMultiProcessorCount, device_), "asking the GPU");

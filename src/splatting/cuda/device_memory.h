@@ -65,7 +65,7 @@ class Array {
   void reserve(size_t size) {
     if (size <= size_) return;
     release();
-    take(size + size / 8);
+    take(Device::kSpareShare > 0 ? size + size / Device::kSpareShare : size);
   }
   /// Exactly so many.
   void take(size_t size) {

@@ -115,7 +115,7 @@ void Engine<Device>::arrange(const Arrangement& a) {
   counts.take(a.num_blocks);
   records.take(size_t{a.num_records} * row::kTableRows);
   const bool in_place = !a.moves && a.num_blocks <= blocks_.size();
-  if (!in_place) target.take(a.num_blocks + a.num_blocks / 8);
+  if (!in_place) target.reserve(a.num_blocks);
   device_.upload(sources.data(), a.sources, slots * sizeof(uint32_t));
   device_.upload(anchors.data(), a.anchors, a.num_blocks * sizeof(int32_t));
   device_.upload(counts.data(), a.counts, a.num_blocks * sizeof(int32_t));

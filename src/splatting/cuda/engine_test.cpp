@@ -32,8 +32,8 @@ struct OnDevice {
   std::vector<float> rgb, depth, alpha;
   Figures figures;
 
-  explicit OnDevice(const Scene& scene, uint64_t memory_limit = kPlenty)
-      : engine(TestDevice(), memory_limit), plane(scene.plane()), num_blocks(scene.model.num_blocks()) {
+  explicit OnDevice(const Scene& scene, uint64_t memory_limit = kPlenty, TestDevice device = TestDevice())
+      : engine(std::move(device), memory_limit), plane(scene.plane()), num_blocks(scene.model.num_blocks()) {
     for (const splatting::Pose& pose : scene.poses)
       anchors.push_back(make_anchor_view(pose, scene.view.camera, scene.options.near));
     view.width = scene.width;
@@ -383,6 +383,44 @@ TEST(CudaEngine, StepsAreTheSameInEveryRunAndWhereMemoryHasToGrow) {
   }
   EXPECT_EQ(results[0], results[1]);
 }
+
+#ifndef __CUDACC__
+/// The host's stand-in for a race detector: see ThreadOrder.
+TEST(CudaEngine, ResultsDoNotDependOnTheOrderOfThreadsAndBlocks) {
+  Scene scene;
+  scene.width = 50;
+  scene.height = 39;
+  scene.count = 300;
+  scene.anchors = 3;
+  scene.build(30);
+  Lesson lesson(scene);
+  std::vector<uint16_t> depth(scene.plane(), 2000);
+  std::vector<uint8_t> mask(scene.plane(), 255);
+  mask[77] = 0;
+  lesson.target.depth = depth.data();
+  lesson.target.mask = mask.data();
+  lesson.target.depth_unit = 1e-3f;
+  lesson.target.num_depth = static_cast<int>(scene.plane());
+  lesson.loss.ssim_weight = 0.2f;
+  lesson.loss.depth_weight = 0.1f;
+  std::vector<float> want;
+  for (const ThreadOrder order : {ThreadOrder::forwards, ThreadOrder::backwards, ThreadOrder::shuffled}) {
+    OnDevice device(scene, kPlenty, HostDevice(order));
+    device.draw();
+    const Figures figures = device.engine.step(device.view, lesson.target, lesson.loss, lesson.constants, true);
+    std::vector<float> got = device.rows();
+    got.insert(got.end(), device.rgb.begin(), device.rgb.end());
+    got.insert(got.end(), device.depth.begin(), device.depth.end());
+    for (const ChannelSums& sums : figures.channels)
+      for (const double sum : {sums.l1, sums.ssim, sums.mse, sums.bias, sums.value})
+        got.push_back(static_cast<float>(sum));
+    for (const double value : figures.pose) got.push_back(static_cast<float>(value));
+    got.push_back(static_cast<float>(figures.depth));
+    if (order == ThreadOrder::forwards) want = got;
+    EXPECT_EQ(got, want) << static_cast<int>(order);
+  }
+}
+#endif
 
 TEST(CudaEngine, WhatFindsNoRoomIsTheFarthest) {
   Scene scene;

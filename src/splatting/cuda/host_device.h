@@ -4,7 +4,9 @@
 
 // The host in the role of a GPU, for tests: its memory is the "device's", kernels run by host_execution.h.
 
-#include <cstdlib>
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <cstring>
 #include <map>
 #include <memory>
@@ -15,15 +17,30 @@ namespace photoslam::splatting::cuda {
 
 class HostDevice {
  public:
-  static constexpr int kUnits = 2;  ///< Multiprocessors.
+  static constexpr int kUnits = 2;          ///< Multiprocessors.
+  static constexpr size_t kSpareShare = 0;  ///< See CudaDevice.
 
-  /// Null: there is no more. Memory starts with garbage, as on a GPU.
+  explicit HostDevice(ThreadOrder order = ThreadOrder::forwards) : order_(order) {}
+
+  /// Null: there is no more. Memory starts with garbage, as on a GPU, and ends (up to 7 bytes) before a page that
+  /// nobody may touch: who reads or writes beyond it crashes.
   void* allocate(size_t bytes) {
-    void* const data = std::malloc(bytes > 0 ? bytes : 1);
-    if (data != nullptr) std::memset(data, 0xff, bytes);
+    const size_t page = page_size(), pages = (bytes + page - 1) / page * page;
+    void* const base = ::mmap(nullptr, pages + page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (base == MAP_FAILED) return nullptr;
+    char* const end = static_cast<char*>(base) + pages;
+    ::mprotect(end, page, PROT_NONE);
+    char* const data = end - (bytes + 7) / 8 * 8;
+    std::memset(data, 0xff, bytes);
+    mappings_[data] = pages + page;
     return data;
   }
-  void release(void* data) { std::free(data); }
+  void release(void* data) {
+    const size_t page = page_size(), size = mappings_.at(data);
+    const auto address = reinterpret_cast<uintptr_t>(data) / page * page;
+    ::munmap(reinterpret_cast<void*>(size == page ? reinterpret_cast<uintptr_t>(data) : address), size);
+    mappings_.erase(data);
+  }
   void upload(void* to, const void* from, size_t bytes) {
     if (bytes > 0) std::memcpy(to, from, bytes);
   }
@@ -40,13 +57,17 @@ class HostDevice {
   void launch(int blocks, const Kernel& kernel) {
     if (blocks <= 0) return;
     auto& threads = threads_[Kernel::kThreads];
-    if (threads == nullptr) threads = std::make_unique<HostBlock>(Kernel::kThreads);
+    if (threads == nullptr) threads = std::make_unique<HostBlock>(Kernel::kThreads, order_);
     run_on_host(*threads, blocks, kernel);
   }
   void mark(int) {}
   float milliseconds(int, int) const { return 0; }
 
  private:
+  static size_t page_size() { return static_cast<size_t>(::sysconf(_SC_PAGESIZE)); }
+
+  ThreadOrder order_;
+  std::map<void*, size_t> mappings_;                   // sizes
   std::map<int, std::unique_ptr<HostBlock>> threads_;  // by their number
 };
 

@@ -7,22 +7,35 @@
 #include <setjmp.h>
 #include <ucontext.h>
 
+#include <algorithm>
 #include <cstring>
 #include <memory>
+#include <numeric>
+#include <utility>
 #include <vector>
 
 #include "base/check.h"
+#include "base/random.h"
 #include "splatting/cuda/group.h"
 
 namespace photoslam::splatting::cuda {
+
+/// In which order threads run up to their next collective, and blocks after each other. A kernel whose result depends
+/// on it lacks a barrier.
+enum class ThreadOrder { forwards, backwards, shuffled };
 
 /// One block of threads, for launch after launch. Blocks run one after the other, threads of a block interleave at
 /// collectives only.
 class HostBlock {
  public:
-  explicit HostBlock(int threads)
-      : fibers_(static_cast<size_t>(threads)), gates_(static_cast<size_t>(1 + threads / kWarpSize)) {
+  explicit HostBlock(int threads, ThreadOrder order = ThreadOrder::forwards)
+      : order_(order),
+        fibers_(static_cast<size_t>(threads)),
+        gates_(static_cast<size_t>(1 + threads / kWarpSize)),
+        sequence_(fibers_.size()) {
     PHOTOSLAM_CHECK(threads > 0 && threads % kWarpSize == 0, "{} threads are no whole warps", threads);
+    std::iota(sequence_.begin(), sequence_.end(), size_t{0});
+    if (order == ThreadOrder::backwards) std::reverse(sequence_.begin(), sequence_.end());
     for (Fiber& fiber : fibers_) fiber.stack = std::make_unique_for_overwrite<char[]>(kStackSize);
   }
 
@@ -43,8 +56,10 @@ class HostBlock {
     size_t finished = 0;
     while (finished < fibers_.size()) {
       bool progress = false;
-      for (current_ = 0; current_ < fibers_.size(); ++current_) {
-        Fiber& fiber = fibers_[current_];
+      if (order_ == ThreadOrder::shuffled) shuffle();
+      for (const size_t thread : sequence_) {
+        current_ = thread;
+        Fiber& fiber = fibers_[thread];
         if (fiber.done || (fiber.gate != nullptr && fiber.gate->generation == fiber.generation)) continue;
         fiber.gate = nullptr;
         progress = true;
@@ -56,6 +71,7 @@ class HostBlock {
     }
   }
 
+  ThreadOrder order() const { return order_; }
   int block() const { return block_; }
   int num_blocks() const { return num_blocks_; }
 
@@ -126,9 +142,17 @@ class HostBlock {
     }
   }
 
+  void shuffle() {
+    for (size_t i = sequence_.size(); i > 1; --i)
+      std::swap(sequence_[i - 1], sequence_[static_cast<size_t>(random_.index(static_cast<int>(i)))]);
+  }
+
+  ThreadOrder order_;
+  Random random_{1};
   int block_ = 0, num_blocks_ = 1;
   std::vector<Fiber> fibers_;
   std::vector<Gate> gates_;
+  std::vector<size_t> sequence_;
   jmp_buf scheduler_;
   size_t current_ = 0;
   void* body_ = nullptr;
@@ -204,7 +228,8 @@ class HostGroup {
 template <class Kernel>
 void run_on_host(HostBlock& block, int num_blocks, const Kernel& kernel) {
   auto shared = std::make_unique<typename Kernel::Shared>();
-  for (int i = 0; i < num_blocks; ++i) {
+  for (int k = 0; k < num_blocks; ++k) {
+    const int i = block.order() == ThreadOrder::forwards ? k : num_blocks - 1 - k;
     std::memset(static_cast<void*>(shared.get()), 0xff, sizeof(typename Kernel::Shared));
     block.run(i, num_blocks, [&](int thread) {
       HostGroup group(block, thread, Kernel::kThreads);

@@ -42,6 +42,29 @@ struct MissBarrier {
   }
 };
 
+/// Lacks a barrier between the two accesses.
+struct RaceThreads {
+  static constexpr int kThreads = 64;
+  struct Shared {
+    int values[64];
+  };
+  int* out;
+  void operator()(HostGroup& group, Shared& shared) const {
+    shared.values[group.thread()] = 0;
+    group.sync();
+    shared.values[group.thread()] = 1;
+    out[group.thread()] = shared.values[63 - group.thread()];
+  }
+};
+
+TEST(HostExecution, ARaceShowsInAnotherOrder) {
+  std::vector<int> forwards(64), backwards(64);
+  HostBlock up(64), down(64, ThreadOrder::backwards);
+  run_on_host(up, 1, RaceThreads{forwards.data()});
+  run_on_host(down, 1, RaceThreads{backwards.data()});
+  EXPECT_NE(forwards, backwards);
+}
+
 TEST(HostExecution, ABarrierThatSomeThreadNeverReachesIsAnError) {
   HostBlock threads(64);
   EXPECT_ANY_THROW(run_on_host(threads, 1, MissBarrier{}));
