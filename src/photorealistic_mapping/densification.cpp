@@ -51,6 +51,7 @@ void DensificationOptions::visit(OptionVisitor& v) {
   v.value({"min_weight", "", 0.0, 1.0, "Gaussians that never weigh more in any pixel of a round are removed."},
           min_weight);
   v.value({"max_gaussians", "", 100, 20000000, "Nothing is added beyond this number."}, max_gaussians);
+  v.value({"relocation", "", 0, 0, "Beyond it, the least visible gaussians make room for new ones."}, relocation);
 }
 
 DensificationCounts densify(const DensificationOptions& options, double scene_depth, Random& random,
@@ -86,6 +87,22 @@ DensificationCounts densify(const DensificationOptions& options, double scene_de
   for (const auto& [anchor, gaussians] : children) model.add(anchor, gaussians);
   model.reset_statistics();
   return counts;
+}
+
+size_t make_room(const DensificationOptions& options, size_t newcomers, splatting::GaussianModel& model) {
+  constexpr float kMinViews = 3;
+  const auto limit = static_cast<size_t>(options.max_gaussians);
+  if (model.size() + newcomers <= limit) return 0;
+  std::vector<std::pair<float, size_t>> order;  // mean weight in a view, index
+  model.for_each([&](size_t index) {
+    const splatting::Statistics s = model.statistics(index);
+    if (s.visible >= kMinViews) order.emplace_back(s.weight / s.visible, index);
+  });
+  const size_t leaving = std::min(model.size() + newcomers - limit, order.size());
+  std::ranges::nth_element(order, order.begin() + static_cast<std::ptrdiff_t>(leaving));
+  std::vector<uint8_t> remove(model.index_end(), 0);
+  for (size_t i = 0; i < leaving; ++i) remove[order[i].second] = 1;
+  return model.remove(remove);
 }
 
 size_t prune(const DensificationOptions& options, double scene_depth, splatting::GaussianModel& model) {

@@ -17,6 +17,7 @@ struct DensificationOptions {
   double max_scale = 0.25;
   double min_weight = 0.02;
   int max_gaussians = 300000;
+  bool relocation = false;
   void visit(OptionVisitor& visitor);
 };
 
@@ -29,6 +30,11 @@ struct DensificationCounts {
 /// with the parent's anchor. `scene_depth` [m] is the scale of the scene. Resets the statistics.
 DensificationCounts densify(const DensificationOptions& options, double scene_depth, Random& random,
                             splatting::GaussianModel& model);
+
+/// Makes room under max_gaussians for so many newcomers: of the gaussians that enough views have judged, those go that
+/// weigh least in a view's picture. With what is then seeded where the picture is wrong, gaussians move from where they
+/// are idle to where they are missed.
+size_t make_room(const DensificationOptions& options, size_t newcomers, splatting::GaussianModel& model);
 
 /// Removes gaussians that are nearly transparent, larger than max_scale * scene_depth, or not finite.
 size_t prune(const DensificationOptions& options, double scene_depth, splatting::GaussianModel& model);

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <limits>
+#include <vector>
 
 namespace photoslam {
 namespace {
@@ -87,6 +88,22 @@ TEST_F(DensificationTest, PruningRemovesTransparentHugeAndBrokenOnes) {
   add(broken, 0);
   EXPECT_EQ(prune(options, 1.0, model), 3u);
   EXPECT_EQ(model.size(), 1u);
+}
+
+TEST_F(DensificationTest, WhatWeighsLeastMakesRoom) {
+  options.max_gaussians = 6;
+  for (const float weight : {5.0f, 1.0f, 4.0f, 2.0f, 3.0f}) {
+    const size_t index = add(gaussian(weight), 0);
+    model.block(index / kBlockSize).weight[index % kBlockSize] = 10 * weight;
+  }
+  add(gaussian(0.1f), 0);
+  model.block(0).visible[5] = 2;  // born a moment ago: too early to judge
+  EXPECT_EQ(make_room(options, 0, model), 0u);
+  EXPECT_EQ(make_room(options, 2, model), 2u);
+  std::vector<float> left;
+  model.for_each([&](size_t i) { left.push_back(std::round(10 * std::exp(model.get(i).log_scale[0])) / 10); });
+  EXPECT_EQ(left, (std::vector{5.0f, 4.0f, 3.0f, 0.1f}));
+  EXPECT_EQ(make_room(options, 100, model), 3u) << "no more than can be judged";
 }
 
 }  // namespace

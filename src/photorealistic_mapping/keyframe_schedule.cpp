@@ -3,7 +3,7 @@
 #include "photorealistic_mapping/keyframe_schedule.h"
 
 #include <algorithm>
-#include <numeric>
+#include <limits>
 
 #include "base/check.h"
 
@@ -17,13 +17,24 @@ void ScheduleOptions::visit(OptionVisitor& v) {
   v.value({"online_level", "", 0, 3, "Finest level while frames arrive; 1 is half resolution."}, online_level);
   v.value({"newest_probability", "", 0.0, 1.0, "Share of the steps that go to the newest keyframe."},
           newest_probability);
+  v.value({"worse_probability", "", 0.0, 1.0,
+           "Share of the steps that go to the keyframe of larger loss out of two drawn at random."},
+          worse_probability);
+}
+
+void KeyframeSchedule::add_view() {
+  active_.push_back(num_views());
+  uses_.push_back(0);
+  losses_.push_back(std::numeric_limits<double>::max());
+}
+
+void KeyframeSchedule::retire(int view) {
+  std::erase(active_, view);
+  std::erase(round_, view);
 }
 
 int KeyframeSchedule::draw() {
-  if (round_.empty()) {
-    round_.resize(uses_.size());
-    std::iota(round_.begin(), round_.end(), 0);
-  }
+  if (round_.empty()) round_ = active_;
   const auto position = static_cast<size_t>(random_.index(static_cast<int>(round_.size())));
   const int view = round_[position];
   round_[position] = round_.back();
@@ -31,11 +42,21 @@ int KeyframeSchedule::draw() {
   return view;
 }
 
+int KeyframeSchedule::draw_worse() {
+  const auto draw_any = [&] { return active_[static_cast<size_t>(random_.index(static_cast<int>(active_.size())))]; };
+  const int a = draw_any(), b = draw_any();
+  return losses_[static_cast<size_t>(a)] >= losses_[static_cast<size_t>(b)] ? a : b;
+}
+
 KeyframeSchedule::Choice KeyframeSchedule::next(bool refining) {
-  PHOTOSLAM_CHECK(!uses_.empty());
+  PHOTOSLAM_CHECK(!active_.empty());
   Choice choice;
-  const bool newest = !refining && random_.uniform() < options_.newest_probability;
-  choice.view = newest ? num_views() - 1 : draw();
+  if (!refining && random_.uniform() < options_.newest_probability) {
+    choice.view = active_.back();
+  } else {
+    const bool worse = options_.worse_probability > 0 && random_.uniform() < options_.worse_probability;
+    choice.view = worse ? draw_worse() : draw();
+  }
   int& uses = uses_[static_cast<size_t>(choice.view)];
   const int finest = refining ? 0 : std::min(options_.online_level, options_.pyramid_levels);
   choice.level = std::max(finest, options_.pyramid_levels - uses / options_.uses_per_level);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "base/options.h"
@@ -17,6 +18,7 @@ struct ScheduleOptions {
   int uses_per_level = 4;
   int online_level = 1;
   double newest_probability = 0.2;
+  double worse_probability = 0;
   void visit(OptionVisitor& visitor);
 };
 
@@ -33,22 +35,31 @@ class KeyframeSchedule {
 
   KeyframeSchedule(const ScheduleOptions& options, uint64_t seed) : options_(options), random_(seed) {}
 
-  void add_view() { uses_.push_back(0); }
+  void add_view();
+  /// This view does not come again.
+  void retire(int view);
   int num_views() const { return static_cast<int>(uses_.size()); }
+  /// Those that are not retired, in order of arrival.
+  std::span<const int> active() const { return active_; }
 
-  /// The next view; there must be one. Views take turns at random, each once per round; the newest one also comes in
-  /// between with newest_probability while online.
+  /// The next view; there must be one. Views take turns at random, each once per round. In between comes, with
+  /// newest_probability while online, the newest, and with worse_probability the one of larger loss out of two.
   Choice next(bool refining);
+  /// What the training of a view came to.
+  void report(int view, double loss) { losses_[static_cast<size_t>(view)] = loss; }
 
   int uses(int view) const { return uses_[static_cast<size_t>(view)]; }
   void serialize(Archive& archive);
 
  private:
   int draw();
+  int draw_worse();
 
   ScheduleOptions options_;
   Random random_;
   std::vector<int> uses_;
+  std::vector<double> losses_;  // as last reported; views not trained yet come first
+  std::vector<int> active_;
   std::vector<int> round_;  // views still to come in this round
 };
 

@@ -60,5 +60,35 @@ TEST(KeyframeSchedule, TheNewestViewGetsItsShare) {
   EXPECT_NEAR(static_cast<double>(newest) / kDraws, expected, 0.015);  // 4.6 standard deviations
 }
 
+TEST(KeyframeSchedule, ARetiredViewDoesNotComeAgain) {
+  KeyframeSchedule schedule({}, 6);
+  for (int i = 0; i < 5; ++i) schedule.add_view();
+  schedule.next(true);  // a round has begun
+  schedule.retire(1);
+  schedule.retire(4);
+  EXPECT_EQ(std::vector(schedule.active().begin(), schedule.active().end()), (std::vector{0, 2, 3}));
+  std::map<int, int> uses;
+  for (int i = 0; i < 200; ++i) ++uses[schedule.next(false).view];
+  EXPECT_EQ(uses.size(), 3u);
+  EXPECT_FALSE(uses.contains(1) || uses.contains(4));
+}
+
+TEST(KeyframeSchedule, TheWorseViewOutOfTwoComes) {
+  ScheduleOptions options;
+  options.worse_probability = 1;
+  KeyframeSchedule schedule(options, 7);
+  constexpr int kViews = 5, kDraws = 20000;
+  for (int i = 0; i < kViews; ++i) {
+    schedule.add_view();
+    schedule.report(i, 0.1 * i);
+  }
+  std::map<int, int> uses;
+  for (int i = 0; i < kDraws; ++i) ++uses[schedule.next(true).view];
+  for (int i = 0; i < kViews; ++i) {
+    const double expected = (2.0 * i + 1) / (kViews * kViews);  // the larger of two uniform draws
+    EXPECT_NEAR(static_cast<double>(uses[i]) / kDraws, expected, 0.016) << i;
+  }
+}
+
 }  // namespace
 }  // namespace photoslam

@@ -33,20 +33,20 @@ void ExposureAdjustment::serialize(Archive& a) {
   a(steps_);
 }
 
-void KeyframeSchedule::serialize(Archive& a) { a(random_, uses_, round_); }
+void KeyframeSchedule::serialize(Archive& a) { a(random_, uses_, losses_, active_, round_); }
 
 void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
   ImageU8 color;
   ImageU16 depth;
-  if (!a.reading()) {
+  if (!a.reading() && view->has_images()) {
     color = color_of(view->targets[0]);
     depth = depth_of(view->targets[0]);
   }
   serialize_image(a, color);
   serialize_image(a, depth);
   if (a.reading()) {
-    add_view(color, depth);
-    view = &views_.back();
+    view = &views_.emplace_back();
+    if (!color.empty()) set_images(color, depth, *view);
   }
   a(view->adjustment, view->exposure);
   if (depth.empty()) serialize_image(a, view->picture.depth);  // otherwise it follows from the depth image

@@ -9,6 +9,7 @@
 #include "image/convert.h"
 #include "math/median.h"
 #include "photorealistic_mapping/view_geometry.h"
+#include "photorealistic_mapping/view_redundancy.h"
 #include "photorealistic_mapping/world_export.h"
 
 namespace photoslam {
@@ -44,6 +45,9 @@ void PhotorealisticOptions::visit(OptionVisitor& v) {
           ssim_weight_online);
   v.value({"ssim_weight", "", 0.0, 1.0, "The same during refinement."}, ssim_weight);
   v.value({"depth_weight", "", 0.0, 10.0, "Weight of the depth loss where depth is measured."}, depth_weight);
+  v.value(
+      {"opacity_weight", "", 0.0, 10.0, "Weight of the mean opacity of the gaussians in view: the fewer, the better."},
+      opacity_weight);
   v.value({"sh_degree", "", 0, 3, "Degree of the spherical harmonics that make colours depend on the view."},
           sh_degree);
   v.value({"near_m", "m", 1e-4, 1.0, "Gaussians nearer to the camera are not drawn."}, near_m);
@@ -52,6 +56,9 @@ void PhotorealisticOptions::visit(OptionVisitor& v) {
       reseed_interval);
   v.value({"reseed_color_error", "", 0.0, 3.0, "Squared colour error above which old keyframes are seeded again."},
           reseed_color_error);
+  v.value({"image_budget_mb", "MB", 1.0, 1e6,
+           "Pictures of keyframes beyond this are forgotten, those first that others resemble most."},
+          image_budget_mb);
   v.group("seeding", "Where and how gaussians are born.", seeding);
   v.group("depth", "Depth of keyframes without a depth sensor.", depth);
   v.group("feature_depth", "Depth of features without a landmark.", feature_depth);
@@ -104,7 +111,7 @@ void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, c
   schedule_.add_view();
   update_poses(map);
 
-  add_view(images.color, images.depth);
+  set_images(images.color, images.depth, views_.emplace_back());
   if (views_.size() > 1) views_.back().exposure.start_from(views_[views_.size() - 2].exposure);
   if (!images.right.empty()) views_.back().right = shrink_color(images.right, kSeedingFactor);
   const size_t index = views_.size() - 1;
@@ -112,10 +119,35 @@ void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, c
   if (index > 0 && views_[index - 1].picture.depth.empty()) seed_keyframe(map, index - 1, executor);
   seed_keyframe(map, index, executor);
   prune(options_.densification, scene_depth_, model_);
+  keep_image_budget();
 }
 
-void PhotorealisticMapper::add_view(const ImageU8& color, const ImageU16& depth) {
-  TrainingView& view = views_.emplace_back();
+double PhotorealisticMapper::TrainingView::megabytes() const {
+  size_t bytes = picture.color.values().size() + picture.depth.values().size_bytes() + right.values().size();
+  for (const splatting::TargetImage& target : targets)
+    bytes += target.planes().size() + target.mask().size() + target.depth().size_bytes();
+  return 1e-6 * static_cast<double>(bytes);
+}
+
+void PhotorealisticMapper::TrainingView::drop_images() {
+  targets.clear();
+  picture = {};
+  right = {};
+}
+
+/// The newest keyframe's pictures stay: the next one's depth may need them.
+void PhotorealisticMapper::keep_image_budget() {
+  const double fitting = options_.image_budget_mb / std::max(views_.back().megabytes(), 1e-6);
+  while (static_cast<double>(schedule_.active().size()) > std::max(fitting, 2.0)) {
+    std::vector<SE3> poses;
+    for (const int view : schedule_.active()) poses.push_back(view_from_world(static_cast<size_t>(view)));
+    const int dispensable = schedule_.active()[most_redundant_view(poses, scene_depth_)];
+    schedule_.retire(dispensable);
+    views_[static_cast<size_t>(dispensable)].drop_images();
+  }
+}
+
+void PhotorealisticMapper::set_images(const ImageU8& color, const ImageU16& depth, TrainingView& view) const {
   const CameraView full{sensor_.camera, color, depth, sensor_.mask};
   for (int level = 0; level <= options_.schedule.pyramid_levels; ++level) {
     const CameraView small = level == 0 ? full : shrink(full, 1 << level);
@@ -153,6 +185,7 @@ void PhotorealisticMapper::sweep_picture(const MapSnapshot& map, size_t index, E
   pictures.reserve(neighbours.size());
   for (const KeyframeId neighbour : neighbours) {
     const auto i = static_cast<size_t>(neighbour.value);
+    if (!views_[i].has_images()) continue;
     pictures.push_back(to_grey(views_[i].picture.color));
     others.push_back({&pictures.back(), view.picture.camera, anchors_from_world_[i] * world_from_reference});
   }
@@ -192,6 +225,7 @@ void PhotorealisticMapper::seed(size_t index, int cell, double min_color_error, 
   const auto at_features = seed_features(options_.seeding, picture, kSeedingFactor, render_, features);
   seeds.insert(seeds.end(), at_features.begin(), at_features.end());
   const auto limit = static_cast<size_t>(options_.densification.max_gaussians);
+  if (options_.densification.relocation) make_room(options_.densification, seeds.size(), model_);
   seeds.resize(std::min(seeds.size(), limit - std::min(limit, model_.size())));
   // Seeds are made in the frame of the adjusted view; the anchor is the geometric keyframe.
   const SE3 anchor_from_view = view.adjustment.correction().inverse();
@@ -226,6 +260,7 @@ splatting::TrainOptions PhotorealisticMapper::train_options(std::optional<double
   train.beta2 = 0.99f;
   train.ssim_weight = static_cast<float>(progress ? options_.ssim_weight : options_.ssim_weight_online);
   train.depth_weight = static_cast<float>(options_.depth_weight);
+  train.opacity_weight = static_cast<float>(options_.opacity_weight);
   return train;
 }
 
@@ -246,6 +281,7 @@ splatting::StepResult PhotorealisticMapper::train(std::optional<double> progress
     if (options_.poses.enabled) view.adjustment.step(options_.poses, scene_depth_, decay, result.pose_gradient);
     if (options_.exposure.enabled) view.exposure.step(options_.exposure, decay, result.exposure_gradient);
   }
+  schedule_.report(choice.view, static_cast<double>(result.loss));
   const double psnr = -10.0 * std::log10(std::max(static_cast<double>(result.mse), 1e-10));
   constexpr double kMemory = 0.98;
   training_psnr_ = iteration_ == 0 ? psnr : kMemory * training_psnr_ + (1.0 - kMemory) * psnr;
@@ -258,8 +294,9 @@ void PhotorealisticMapper::maintain(std::optional<double> progress, Executor& ex
   constexpr double kGrowthEnd = 0.6;  // share of the refinement after which the map only settles
   const bool growing = !progress || *progress < kGrowthEnd;
   if (growing && options_.reseed_interval > 0 && iteration_ % options_.reseed_interval == 0) {
-    const auto view = static_cast<size_t>(random_.index(static_cast<int>(views_.size())));
-    seed(view, options_.seeding.cell_px / 2, options_.reseed_color_error, {}, executor);
+    const auto active = schedule_.active();
+    const auto view = active[static_cast<size_t>(random_.index(static_cast<int>(active.size())))];
+    seed(static_cast<size_t>(view), options_.seeding.cell_px / 2, options_.reseed_color_error, {}, executor);
   }
   if (iteration_ % options_.densification.interval != 0) return;
   if (growing && progress && options_.densification.enabled) {

@@ -38,10 +38,12 @@ struct PhotorealisticOptions {
   double ssim_weight_online = 0.0;
   double ssim_weight = 0.2;
   double depth_weight = 0.0;
+  double opacity_weight = 0.0;
   int sh_degree = 1;
   double near_m = 0.01;
   int reseed_interval = 25;
   double reseed_color_error = 0.03;
+  double image_budget_mb = 1000;
   SeedingOptions seeding;
   KeyframeDepthOptions depth;
   FeatureDepthOptions feature_depth;
@@ -114,7 +116,7 @@ class PhotorealisticMapper {
   void serialize(Archive& archive);
 
  private:
-  /// A keyframe as training material.
+  /// A keyframe as training material, while its pictures are within the budget.
   struct TrainingView {
     PoseAdjustment adjustment;  // photometric correction of the keyframe's pose
     ExposureAdjustment exposure;
@@ -122,12 +124,16 @@ class PhotorealisticMapper {
     std::vector<splatting::TargetImage> targets;
     DepthPicture picture;  // half the size, for seeding
     ImageU8 right;         // stereo: grey, half the size
+    bool has_images() const { return !targets.empty(); }
+    double megabytes() const;
+    void drop_images();
   };
 
   SE3 view_from_world(size_t view) const;
   splatting::RenderOptions render_options() const;
   splatting::TrainOptions train_options(std::optional<double> progress) const;
-  void add_view(const ImageU8& color, const ImageU16& depth);
+  void set_images(const ImageU8& color, const ImageU16& depth, TrainingView& view) const;
+  void keep_image_budget();
   void serialize_view(Archive& archive, TrainingView* view);
   void rescale(size_t view, double factor);
   void seed_keyframe(const MapSnapshot& map, size_t view, Executor& executor);

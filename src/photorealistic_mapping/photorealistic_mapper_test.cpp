@@ -279,5 +279,30 @@ TEST_F(PhotorealisticMapperTest, MapsOnAGpuAsOnTheCpu) {
 }
 #endif
 
+TEST_F(PhotorealisticMapperTest, ForgetsPicturesBeyondTheBudgetAndGoesOn) {
+  const MapperSensor sensor{.camera = kCamera, .stereo_baseline_m = kBaseline};
+  PhotorealisticOptions options;
+  // 320x240: colour on three levels, half of it again for seeding with depth, and the right image.
+  const double one_view_mb = 1e-6 * 320 * 240 * (3 * (1 + 1 / 4.0 + 1 / 16.0) + (3 + 4 + 1) / 4.0);
+  options.image_budget_mb = 3.5 * one_view_mb;
+  PhotorealisticMapper mapper(options, sensor, 1);
+  for (const double x : {0.0, 0.3, 0.31, 0.6, 0.61}) {
+    add(mapper, at(x), stereo(at(x)));
+    for (int i = 0; i < 15; ++i) mapper.train({}, executor_);
+  }
+  const FrozenMap map = mapper.freeze();
+  EXPECT_EQ(map.keyframes_from_world.size(), 5u) << "a keyframe without pictures still carries gaussians";
+  Archive saved;
+  mapper.serialize(saved);
+  EXPECT_LT(static_cast<double>(saved.bytes().size()), 1e6 * (5 * one_view_mb)) << "pictures of three";
+
+  PhotorealisticMapper loaded(options, sensor, 99);
+  Archive reader(saved.bytes());
+  loaded.serialize(reader);
+  for (int i = 0; i < 40; ++i) {
+    ASSERT_EQ(mapper.train({}, executor_).loss, loaded.train({}, executor_).loss) << i;
+  }
+}
+
 }  // namespace
 }  // namespace photoslam

@@ -17,7 +17,7 @@
 namespace photoslam {
 namespace {
 
-constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 3, .oldest = 3};
+constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 4, .oldest = 4};
 
 /// Lets deflate or inflate work through the input; their counts have 32 bits.
 template <class Step>
