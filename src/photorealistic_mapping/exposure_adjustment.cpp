@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "base/check.h"
 
@@ -28,24 +29,30 @@ splatting::Exposure ExposureAdjustment::exposure() const {
 
 void ExposureAdjustment::match(const ImageU8& picture, const splatting::RenderResult& render) {
   constexpr float kOpaque = 0.8f;
-  constexpr int kDark = 5, kSaturated = 250;  // such pixels say nothing about brightness
   constexpr double kMinShare = 0.2, kMaxLogGain = 1.4;
+  constexpr double kTrustedError = 0.1;  // where gain * render is off by this share, the ratio counts by half
   const size_t plane = render.alpha.size(), channels = static_cast<size_t>(picture.channels());
   PHOTOSLAM_CHECK(picture.values().size() == channels * plane, "picture of {} values, render of {} pixels",
                   picture.values().size(), plane);
-  const auto pixels = picture.values();
+  std::vector<size_t> opaque;
+  for (size_t i = 0; i < plane; ++i) {
+    if (render.alpha[i] >= kOpaque) opaque.push_back(i);
+  }
+  if (static_cast<double>(opaque.size()) < kMinShare * static_cast<double>(plane)) return;
   for (size_t c = 0; c < 3; ++c) {
-    double seen = 0, drawn = 0;
-    size_t count = 0;
-    for (size_t i = 0; i < plane; ++i) {
-      const int value = pixels[channels * i + (channels == 3 ? c : 0)];
-      if (render.alpha[i] < kOpaque || value < kDark || value > kSaturated) continue;
-      seen += static_cast<double>(render.alpha[i]) * value / 255.0;
-      drawn += static_cast<double>(render.rgb[c * plane + i]);
-      ++count;
+    const auto seen_at = [&](size_t i) { return picture.values()[channels * i + (channels == 3 ? c : 0)] / 255.0; };
+    const auto drawn_at = [&](size_t i) { return static_cast<double>(render.rgb[c * plane + i] / render.alpha[i]); };
+    double seen = 0, drawn = 0, error = 0;
+    for (const size_t i : opaque) {
+      seen += seen_at(i);
+      drawn += drawn_at(i);
     }
-    if (static_cast<double>(count) < kMinShare * static_cast<double>(plane) || drawn <= 0) continue;
-    parameters_[c] = std::clamp(std::log(seen / drawn), -kMaxLogGain, kMaxLogGain);
+    if (seen <= 0 || drawn <= 0) continue;
+    const double gain = seen / drawn;
+    for (const size_t i : opaque) error += std::abs(seen_at(i) - gain * drawn_at(i));
+    const double doubt = error / seen / kTrustedError;
+    const double log_gain = std::clamp(std::log(gain), -kMaxLogGain, kMaxLogGain);
+    parameters_[c] += (log_gain - parameters_[c]) / (1 + doubt * doubt);
     parameters_[3 + c] = 0;
   }
 }

@@ -28,9 +28,10 @@ struct ExposureOptions {
 class ExposureAdjustment {
  public:
   splatting::Exposure exposure() const;
-  /// The gains that make a render as bright as the picture, where it is opaque; nothing changes where that is next to
-  /// nowhere. Sums are compared, not fitted: noise in either does not bend the ratio. The picture has the render's
-  /// size.
+  /// Moves towards the gains that make a render as bright as the picture, where it is opaque; nothing changes where
+  /// that is next to nowhere. Sums of all values are compared: noise does not bend their ratio, and neither does blur,
+  /// unless values are left out by their brightness. The worse render and picture agree, the less the ratio counts, for
+  /// then it tells what the map lacks rather than the exposure. The picture has the render's size.
   void match(const ImageU8& picture, const splatting::RenderResult& render);
   /// Takes over another keyframe's.
   void start_from(const ExposureAdjustment& other) { parameters_ = other.parameters_; }

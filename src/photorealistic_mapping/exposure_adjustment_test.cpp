@@ -92,6 +92,35 @@ TEST(ExposureAdjustment, MatchesTheBrightnessOfARenderWhereItIsOpaque) {
   EXPECT_EQ(unchanged.exposure().gain[0], 1) << "nothing opaque to compare with";
 }
 
+/// A render of stripes, and the picture of it with another exposure, shifted sideways by some pixels.
+double matched_gain(double gain, int shift) {
+  constexpr int kWidth = 64, kHeight = 8, kStripe = 8;
+  splatting::RenderResult render;
+  render.width = kWidth;
+  render.height = kHeight;
+  render.alpha.assign(kWidth * kHeight, 1.0f);
+  render.rgb.resize(3 * render.alpha.size());
+  ImageU8 picture(kWidth, kHeight, 3);
+  const auto stripes = [&](int x) { return (x + kStripe) / kStripe % 2 == 0 ? 0.2 : 0.9; };
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      for (size_t c = 0; c < 3; ++c) {
+        render.rgb[c * render.alpha.size() + static_cast<size_t>(y * kWidth + x)] = static_cast<float>(stripes(x));
+        picture(x, y, static_cast<int>(c)) = static_cast<uint8_t>(std::lround(255 * gain * stripes(x + shift)));
+      }
+    }
+  }
+  ExposureAdjustment adjustment;
+  adjustment.match(picture, render);
+  return static_cast<double>(adjustment.exposure().gain[1]);
+}
+
+TEST(ExposureAdjustment, ARenderThatDoesNotFitCountsLittle) {
+  EXPECT_NEAR(matched_gain(0.7, 0), 0.7, 0.01);
+  EXPECT_NEAR(matched_gain(0.7, 8), 1.0, 0.02) << "bright stripes where dark ones are drawn";
+  EXPECT_NEAR(matched_gain(1.0, 3), 1.0, 0.02) << "misplaced stripes are no change of brightness";
+}
+
 TEST(ExposureAdjustment, AColorWithTheExposureRemovedRendersAsThePicture) {
   constexpr float kSh0 = 0.28209479177387814f;
   const splatting::Exposure exposure{{1.25f, 0.8f, 1.0f}, {0.02f, -0.05f, 0.0f}};
