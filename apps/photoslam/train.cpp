@@ -146,7 +146,7 @@ bool is_held_out(const TrainArguments& arguments, size_t i) {
   return arguments.hold_out > 0 && static_cast<int>(i) % arguments.hold_out == arguments.hold_out - 1;
 }
 
-void train_until_done(const TrainArguments& arguments, std::stop_token stop, Executor& executor,
+void train_until_done(const TrainArguments& arguments, const std::stop_token& stop, Executor& executor,
                       PhotorealisticMapper& mapper) {
   const Stopwatch clock;
   double last_line = 0;

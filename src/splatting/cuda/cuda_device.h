@@ -30,6 +30,7 @@ class CudaDevice {
     check_cuda(cudaDeviceGetAttribute(&num_units_, cudaDevAttrMultiProcessorCount, device_), "asking the GPU");
     check_cuda(cudaDeviceGetAttribute(&has_pools_, cudaDevAttrMemoryPoolsSupported, device_), "asking the GPU");
     check_cuda(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "making a stream");
+    probe_pools();
     for (cudaEvent_t& event : marks_) check_cuda(cudaEventCreate(&event), "making an event");
     check_cuda(cudaMallocHost(&staging_, kStagingSize), "allocating pinned memory");
   }
@@ -122,6 +123,14 @@ class CudaDevice {
   static constexpr int kMarks = 8;
   static constexpr size_t kStagingSize = size_t{1} << 20;
 
+  /// Some drivers claim pools of memory that they then refuse (virtual machines).
+  void probe_pools() {
+    if (has_pools_ == 0) return;
+    void* data = nullptr;
+    if (cudaMallocAsync(&data, 256, stream_) == cudaSuccess && cudaFreeAsync(data, stream_) == cudaSuccess) return;
+    (void)cudaGetLastError();
+    has_pools_ = 0;
+  }
   void bind() const { check_cuda(cudaSetDevice(device_), "choosing a GPU"); }
   void wait() {
     check_cuda(cudaStreamSynchronize(stream_), "waiting for the GPU");
