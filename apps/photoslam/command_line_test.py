@@ -22,7 +22,7 @@ from pathlib import Path
 BINARY = os.environ["PHOTOSLAM_BINARY"]
 SEQUENCE = Path(os.environ.get("PHOTOSLAM_SEQUENCE", "no sequence"))
 SOURCE_DIR = Path(os.environ.get("PHOTOSLAM_SOURCE_DIR", Path(__file__).resolve().parents[2]))
-COMMANDS = ["run", "eval", "render", "export", "train", "synth", "doctor", "config"]
+COMMANDS = ["run", "eval", "render", "export", "train", "synth", "doctor", "config", "merge"]
 FAST = ["--pace", "asap", "--set", "pipeline.iterations_per_frame=1"]
 
 
@@ -386,6 +386,28 @@ class SessionTest(CommandLineTest):
         size = [len((run / "map.ply").read_bytes()) for run in (first, second)]
         self.assertGreaterEqual(size[1], size[0])
         self.assertTrue((second / "session.photoslam").is_file())
+
+    def test_two_sessions_are_merged(self):
+        first = self.run_session()
+        second = self.run_deterministic("second", "--set", "pipeline.iterations_per_frame=1", "--seed", "2")
+        both = self.folder / "both"
+        # So short a walk has no keyframes left that could confirm a loop.
+        result = photoslam("merge", first, second / "session.photoslam", "--output", both, "--set",
+                           "loop_closure.detection.min_confirmations=0")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stdout, r"\d+ \+ \d+ keyframes, [1-9]\d* loop\(s\) closed")
+        lines = [(run / "keyframes.tum").read_text(encoding="utf-8").splitlines() for run in (first, second, both)]
+        keyframes = [sum(not line.startswith("#") for line in poses) for poses in lines]
+        self.assertEqual(keyframes[2], keyframes[0] + keyframes[1])
+        self.assertTrue((both / "map.ply").is_file())
+        found = self.run_deterministic("found", "--load-map", both, "--localize-only")
+        frames = json.loads((found / "report.json").read_text(encoding="utf-8"))["frames"]
+        self.assertEqual(frames["tracked"], frames["total"])
+
+    def test_a_session_is_not_merged_with_something_else(self):
+        first = self.run_session()
+        self.assert_fails(photoslam("merge", first, self.folder / "nowhere", "--output", self.output), 1, "nowhere")
+        self.assert_nothing_written()
 
     def test_damaged_sessions(self):
         session = self.run_session() / "session.photoslam"

@@ -18,5 +18,6 @@ void add_doctor(CommandLine& line);
 void add_config(CommandLine& line);
 void add_export(CommandLine& line);
 void add_train(CommandLine& line);
+void add_merge(CommandLine& line);
 
 }  // namespace photoslam

@@ -9,6 +9,7 @@ int main(int argc, char** argv) {
   photoslam::add_render(line);
   photoslam::add_export(line);
   photoslam::add_train(line);
+  photoslam::add_merge(line);
   photoslam::add_synth(line);
   photoslam::add_bench(line);
   photoslam::add_doctor(line);

@@ -44,6 +44,8 @@ class GeometryMapper {
   GeometryMapper(const GeometryMapperOptions& options, const OrbOptions& orb, const PinholeCamera& camera, double bf);
   /// Continues with a map made before.
   void set_map(Map map) { map_ = std::move(map); }
+  /// Adds another's map to this one's.
+  void append(const GeometryMapper& other) { map_.append(other.map_); }
   /// Writes map and state, or replaces them by those read.
   void serialize(Archive& archive);
 

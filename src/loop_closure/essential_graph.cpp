@@ -16,29 +16,28 @@ PoseGraph essential_graph(const MapSnapshot& map, int min_shared) {
     graph.pose_from_world.emplace_back(view->keyframe.camera_from_world);
     graph.pose_is_fixed.push_back(view->keyframe.parent.valid() ? 0 : 1);
   }
-  const auto connect = [&](KeyframeId a, KeyframeId b) {
+  constexpr double kTypicalShared = 100;
+  constexpr int kLeastShared = 15;  // of keyframes that count as covisible; parents may have lost some
+  const auto connect = [&](KeyframeId a, KeyframeId b, int shared) {
     const Sim3 &a_from_world = graph.pose_from_world[static_cast<size_t>(a.value)],
                &b_from_world = graph.pose_from_world[static_cast<size_t>(b.value)];
-    graph.edges.push_back({a.value, b.value, b_from_world * a_from_world.inverse()});
+    graph.edges.push_back({a.value, b.value, b_from_world * a_from_world.inverse(), shared / kTypicalShared});
   };
   for (const auto& view : map.keyframes) {
     const Keyframe& keyframe = view->keyframe;
-    if (keyframe.parent.valid()) connect(keyframe.parent, keyframe.id);
+    int shared_with_parent = kLeastShared;
     for (const auto& [other, shared] : view->covisible) {
-      if (shared >= min_shared && other < keyframe.id && other != keyframe.parent) connect(other, keyframe.id);
+      if (other == keyframe.parent) shared_with_parent = shared;
+      if (shared >= min_shared && other < keyframe.id && other != keyframe.parent) connect(other, keyframe.id, shared);
     }
+    if (keyframe.parent.valid()) connect(keyframe.parent, keyframe.id, shared_with_parent);
   }
   return graph;
 }
 
-KeyframeId root_of(const MapSnapshot& map, KeyframeId id) {
-  while (map.keyframe(id).keyframe.parent.valid()) id = map.keyframe(id).keyframe.parent;
-  return id;
-}
-
 /// Moves the younger of two maps so that the loop is met. Returns its root and the keyframe that it now hangs on.
 std::pair<KeyframeId, KeyframeId> join_maps(const MapSnapshot& map, const Loop& loop, PoseGraph& graph) {
-  const KeyframeId then_root = root_of(map, loop.then), now_root = root_of(map, loop.now);
+  const KeyframeId then_root = map.root_of(loop.then), now_root = map.root_of(loop.now);
   const bool now_moves = then_root < now_root;
   const KeyframeId moving_root = now_moves ? now_root : then_root;
   const auto pose = [&](KeyframeId id) -> Sim3& { return graph.pose_from_world[static_cast<size_t>(id.value)]; };
@@ -46,7 +45,7 @@ std::pair<KeyframeId, KeyframeId> join_maps(const MapSnapshot& map, const Loop& 
                                             : pose(loop.then).inverse() * loop.now_from_then.inverse() * pose(loop.now);
   for (const auto& view : map.keyframes) {
     const KeyframeId id = view->keyframe.id;
-    if (root_of(map, id) == moving_root) pose(id) = pose(id) * old_from_new_world;
+    if (map.root_of(id) == moving_root) pose(id) = pose(id) * old_from_new_world;
   }
   graph.pose_is_fixed[static_cast<size_t>(moving_root.value)] = 0;
   return {moving_root, now_moves ? loop.then : loop.now};
@@ -66,8 +65,8 @@ MapCorrection close_loop(const PoseGraphOptions& options, int min_shared, bool w
                          const Loop& loop) {
   PoseGraph graph = essential_graph(map, min_shared);
   const std::vector<Sim3> before = graph.pose_from_world;
-  MapCorrection correction;
-  if (root_of(map, loop.then) != root_of(map, loop.now)) {
+  MapCorrection correction = recognize_landmarks(map, loop);
+  if (map.root_of(loop.then) != map.root_of(loop.now)) {
     correction.new_parents.push_back(join_maps(map, loop, graph));
   }
   // One exact observation against long chains of others: the loop is to be met, not to be averaged away.
@@ -78,6 +77,11 @@ MapCorrection close_loop(const PoseGraphOptions& options, int min_shared, bool w
   for (size_t i = 0; i < before.size(); ++i) {
     correction.new_world_from_old_world.push_back(graph.pose_from_world[i].inverse() * before[i]);
   }
+  return correction;
+}
+
+MapCorrection recognize_landmarks(const MapSnapshot& map, const Loop& loop) {
+  MapCorrection correction;
   const Keyframe& now = map.keyframe(loop.now).keyframe;
   for (const auto& [landmark, keypoint] : loop.matches) {
     LandmarkId present = now.landmarks[static_cast<size_t>(keypoint)];

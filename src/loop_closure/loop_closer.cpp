@@ -35,8 +35,9 @@ std::optional<MapCorrection> LoopCloser::process(const MapSnapshot& map, const s
     count_reconnection(map, now);
     std::optional<Loop> loop = detector_.detect(map, now);
     if (!loop) continue;
-    ++num_closed_;
     ++num_issued_;
+    if (loop->is_met) return recognize_landmarks(map, *loop);
+    ++num_closed_;
     must_adjust_ = true;
     loops_.push_back(*loop);
     return close_loop(options_.pose_graph, options_.essential_landmarks, bf_ <= 0, map, *loop);

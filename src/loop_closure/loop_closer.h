@@ -18,7 +18,7 @@ struct LoopClosureOptions {
   int essential_landmarks = 60;
   LoopDetectorOptions detection;
   PoseGraphOptions pose_graph;
-  BundleOptions bundle;
+  BundleOptions bundle{.max_iterations = 50, .relative_cost_tolerance = 1e-6};
   void visit(OptionVisitor& visitor);
 };
 

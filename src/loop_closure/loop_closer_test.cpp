@@ -93,6 +93,22 @@ TEST_P(LoopCloserSeeds, RepeatedDoorsAreNoLoop) {
   }
 }
 
+TEST(LoopCloser, RecognizesTheLandmarksOfAPlaceThatIsMet) {
+  CorridorWorld corridor = CorridorWorld::square(10, 3);
+  Closing closing(corridor, true, 0, 3);
+  closing.geometry.set_map(corridor.drifted_map(0, 0, 0, true, 3));
+  const auto last = KeyframeId(static_cast<int32_t>(corridor.truth.size()) - 1);
+  const auto sees_the_start = [&] {
+    const auto covisible = closing.geometry.map().covisible_keyframes(last, 15);
+    return std::ranges::any_of(covisible, [](const auto& k) { return k.keyframe.value < 40; });
+  };
+  ASSERT_FALSE(sees_the_start());
+  closing.run();
+  EXPECT_TRUE(sees_the_start());
+  EXPECT_EQ(closing.closer.num_closed(), 0);
+  EXPECT_LT(closing.gap(), 0.02);
+}
+
 /// Cuts a map in two: what keyframes from `first` on see becomes a map of its own, somewhere else in the world.
 Map cut(Map map, KeyframeId first, const Sim3& elsewhere) {
   std::vector<Sim3> moves(map.num_keyframes());

@@ -83,7 +83,7 @@ std::set<KeyframeId> connected(const MapSnapshot& map, KeyframeId id) {
 
 void LoopDetectorOptions::visit(OptionVisitor& v) {
   v.value({"max_candidates", "", 1, 100, "Similar keyframes that are verified for each new one."}, max_candidates);
-  v.value({"min_keyframe_gap", "", 1, 10000, "A loop spans at least so many keyframes."}, min_keyframe_gap);
+  v.value({"min_keyframe_gap", "", 1, 10000, "A loop spans at least so many keyframes of one map."}, min_keyframe_gap);
   v.value({"min_matches", "", 6, 1000, "Descriptor matches a candidate needs."}, min_matches);
   v.value({"min_guided_matches", "", 6, 10000, "Landmarks of the old place that must be found again."},
           min_guided_matches);
@@ -125,11 +125,15 @@ LoopDetector::LoopDetector(const LoopDetectorOptions& options, const OrbOptions&
     : options_(options), camera_(camera), bf_(bf), with_scale_(with_scale), projector_(orb, camera, bf) {}
 
 std::optional<Loop> LoopDetector::detect(const MapSnapshot& map, KeyframeId now) {
+  std::optional<Loop> met;
   for (const PlaceCandidate& candidate : similar_places(map, map.keyframe(now).keyframe)) {
     auto loop = verify(map, KeyframeId(candidate.place), now);
-    if (loop && !is_met(map, *loop) && confirm(map, *loop)) return loop;
+    if (!loop) continue;
+    loop->is_met = is_met(map, *loop);
+    if (!loop->is_met && confirm(map, *loop)) return loop;
+    if (loop->is_met && !met && is_news(map, *loop)) met = std::move(loop);
   }
-  return std::nullopt;
+  return met;
 }
 
 void LoopDetector::add(const MapSnapshot& map, KeyframeId id) {
@@ -140,7 +144,9 @@ std::vector<PlaceCandidate> LoopDetector::similar_places(const MapSnapshot& map,
   const std::vector<Descriptor> descriptors = strongest_descriptors(now.frame->features);
   const std::set<KeyframeId> known = connected(map, now.id);
   const auto accept = [&](int place) {
-    return now.id.value - place >= options_.min_keyframe_gap && !known.contains(KeyframeId(place));
+    const KeyframeId then(place);
+    const bool is_long_ago = now.id.value - place >= options_.min_keyframe_gap;
+    return !known.contains(then) && (is_long_ago || map.root_of(then) != map.root_of(now.id));
   };
   auto candidates = index_.query(descriptors, options_.max_candidates, accept);
   index_.add(now.id.value, descriptors);
@@ -246,8 +252,9 @@ std::optional<Loop> LoopDetector::verify(const MapSnapshot& map, KeyframeId then
   return enough && is_same_place(seen) ? std::optional(loop) : std::nullopt;
 }
 
-/// Whether the map has the landmarks already where the loop wants them in the image.
+/// Whether the map has the landmarks already where the loop wants them in the image, and not by chance.
 bool LoopDetector::is_met(const MapSnapshot& map, const Loop& loop) const {
+  if (map.root_of(loop.then) != map.root_of(loop.now)) return false;
   const SE3& then_from_world = map.keyframe(loop.then).keyframe.camera_from_world;
   const SE3& now_from_world = map.keyframe(loop.now).keyframe.camera_from_world;
   std::vector<double> shifts;  // [px]
@@ -261,6 +268,16 @@ bool LoopDetector::is_met(const MapSnapshot& map, const Loop& loop) const {
                               : std::numeric_limits<double>::infinity());
   }
   return shifts.empty() || lower_median(shifts) < options_.min_shift_px;
+}
+
+/// Whether most of what was found again are other landmarks than the map has there.
+bool LoopDetector::is_news(const MapSnapshot& map, const Loop& loop) const {
+  const Keyframe& now = map.keyframe(loop.now).keyframe;
+  const auto known = std::ranges::count_if(loop.matches, [&](const auto& match) {
+    LandmarkId present = now.landmarks[static_cast<size_t>(match.second)];
+    return map.find(present) != nullptr && present == match.first;
+  });
+  return 2 * known < std::ssize(loop.matches);
 }
 
 bool LoopDetector::confirm(const MapSnapshot& map, const Loop& loop) {

@@ -31,12 +31,13 @@ struct LoopDetectorOptions {
   void visit(OptionVisitor& visitor);
 };
 
-/// Keyframe `now` sees again what `then` saw, and the map does not know it yet.
+/// Keyframe `now` sees again what `then` saw, and the map does not know it yet: it has the place elsewhere, or twice.
 struct Loop {
   KeyframeId then, now;
   Sim3 now_from_then;                               ///< Between the camera frames, by what both see.
   std::vector<std::pair<LandmarkId, int>> matches;  ///< Landmarks around `then` and keypoints of `now`.
   std::vector<LandmarkId> landmarks;                ///< All landmarks around `then`.
+  bool is_met = false;  ///< They are where they should be already: only to be recognised as the same.
 };
 
 /// Recognises places: an index of descriptors proposes keyframes that look alike, geometry decides. A loop is reported
@@ -67,6 +68,7 @@ class LoopDetector {
                 const Keyframe& keyframe, double radius_px);
   bool is_same_place(const Search& search) const;
   bool is_met(const MapSnapshot& map, const Loop& loop) const;
+  bool is_news(const MapSnapshot& map, const Loop& loop) const;
   bool confirm(const MapSnapshot& map, const Loop& loop);
   std::optional<Vec3> point_in_camera(const MapSnapshot& map, const Keyframe& keyframe, size_t keypoint) const;
 

@@ -143,6 +143,8 @@ void Map::set_pose(KeyframeId id, const SE3& camera_from_world) {
 }
 
 void Map::apply(const MapCorrection& correction) {
+  ++num_corrections_;
+  if (correction.new_world_from_old_world.empty()) return;
   std::vector<Sim3> moves;  // [K] new_world_from_old_world
   for (Keyframe& keyframe : keyframes_) {
     const auto id = static_cast<size_t>(keyframe.id.value);
@@ -168,7 +170,29 @@ void Map::apply(const MapCorrection& correction) {
     update_view(id);
   }
   for (const auto& [child, parent] : correction.new_parents) set_parent(child, parent);
-  ++num_corrections_;
+}
+
+void Map::append(const Map& other) {
+  const auto num_keyframes = static_cast<int32_t>(keyframes_.size());
+  const auto num_landmarks = static_cast<int32_t>(landmarks_.size());
+  const auto count_on = [&](auto& id) {
+    constexpr bool kOfKeyframe = std::is_same_v<std::remove_reference_t<decltype(id)>, KeyframeId>;
+    if (id.valid()) id.value += kOfKeyframe ? num_keyframes : num_landmarks;
+  };
+  for (Keyframe keyframe : other.keyframes_) {
+    count_on(keyframe.id);
+    count_on(keyframe.parent);
+    std::ranges::for_each(keyframe.landmarks, count_on);
+    changed_keyframes_.insert(keyframe.id);
+    keyframes_.push_back(std::move(keyframe));
+  }
+  for (Landmark landmark : other.landmarks_) {
+    count_on(landmark.view.replaced_by);
+    count_on(landmark.created_by);
+    for (LandmarkObservation& o : landmark.observations) count_on(o.keyframe);
+    changed_chunks_.insert(static_cast<int>(landmarks_.size()) / MapSnapshot::kChunk);
+    landmarks_.push_back(std::move(landmark));
+  }
 }
 
 void Map::count_sightings(LandmarkId id, int visible, int found) {

@@ -54,6 +54,9 @@ class Map {
   /// Keyframes sharing at least `min_shared` landmarks with this one, strongest first, ties by id.
   std::vector<CovisibleKeyframe> covisible_keyframes(KeyframeId id, int min_shared) const;
 
+  /// Adds a map of its own, its ids counted on from those of this one. Nothing connects the two yet.
+  void append(const Map& other);
+
   /// Writes the map, or replaces this one by the map read; `image_width` and `image_height` are those of its camera.
   void serialize(Archive& archive, int image_width, int image_height);
 

@@ -14,7 +14,7 @@ namespace photoslam {
 /// How a loop changes the map: a message from loop closure to geometry mapping, computed on a snapshot. The map may
 /// have grown and moved since; corrections are relative, so that nothing of that is lost.
 struct MapCorrection {
-  /// [K] by KeyframeId of the snapshot: the world around each keyframe moves by this.
+  /// [K] by KeyframeId of the snapshot: the world around each keyframe moves by this. Empty: nothing moves.
   std::vector<Sim3> new_world_from_old_world = {};
   /// Moves in addition to that of the oldest observer [m, new world].
   std::map<LandmarkId, Vec3> landmark_shifts = {};

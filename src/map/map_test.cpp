@@ -43,6 +43,27 @@ class MapTest : public ::testing::Test {
   Map map;
 };
 
+TEST_F(MapTest, AppendedMapCountsOnFromItsOwnIds) {
+  const LandmarkId dead = map.add_landmark(Vec3(0, 0, 3), KeyframeId(0), 0);
+  const LandmarkId seen = map.add_landmark(Vec3(0, 1, 3), KeyframeId(1), 2);
+  map.add_observation(seen, KeyframeId(3), 4);
+  map.fuse(dead, seen);
+  map.set_parent(KeyframeId(2), KeyframeId(1));
+  const Map other = map;
+  map.append(other);
+  EXPECT_EQ(map.num_keyframes(), 8u);
+  EXPECT_EQ(map.keyframe(KeyframeId(6)).parent, KeyframeId(5));
+  EXPECT_FALSE(map.keyframe(KeyframeId(4)).parent.valid());
+  EXPECT_EQ(map.keyframe(KeyframeId(5)).landmarks[2], LandmarkId(3));
+  EXPECT_EQ(map.landmark(LandmarkId(2)).view.replaced_by, LandmarkId(3));
+  expect_consistent(map);
+  const auto snapshot = map.snapshot();
+  LandmarkId found(2);
+  ASSERT_NE(snapshot->find(found), nullptr);
+  EXPECT_EQ(found, LandmarkId(3));
+  EXPECT_EQ(snapshot->root_of(KeyframeId(6)), KeyframeId(5));
+}
+
 TEST_F(MapTest, StaysConsistentUnderRandomOperations) {
   Random random(5);
   for (int step = 0; step < 3000; ++step) {

@@ -4,6 +4,11 @@
 
 namespace photoslam {
 
+KeyframeId MapSnapshot::root_of(KeyframeId id) const {
+  while (keyframe(id).keyframe.parent.valid()) id = keyframe(id).keyframe.parent;
+  return id;
+}
+
 const LandmarkView* MapSnapshot::find(LandmarkId& id) const {
   while (id.valid() && id.value < num_landmarks) {
     const auto chunk = static_cast<size_t>(id.value / kChunk);

@@ -40,6 +40,9 @@ class MapSnapshot {
   bool has(KeyframeId id) const { return id.valid() && static_cast<size_t>(id.value) < keyframes.size(); }
   const KeyframeView& keyframe(KeyframeId id) const { return *keyframes[static_cast<size_t>(id.value)]; }
 
+  /// The root of the spanning tree that a keyframe is in: each map of its own has one.
+  KeyframeId root_of(KeyframeId id) const;
+
   /// The landmark, or the one that replaced it; nullptr when it is dead or not part of this snapshot. `id` is updated.
   const LandmarkView* find(LandmarkId& id) const;
 };

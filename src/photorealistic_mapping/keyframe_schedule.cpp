@@ -20,6 +20,12 @@ void ScheduleOptions::visit(OptionVisitor& v) {
   v.value({"worse_probability", "", 0.0, 1.0,
            "Share of the steps that go to the keyframe of larger loss out of two drawn at random."},
           worse_probability);
+  v.value(
+      {"seam_px", "px", 0.0, 1000.0,
+       "A keyframe is trained next when a correction of the map moves what its neighbours show by more than this in "
+       "its picture …"},
+      seam_px);
+  v.value({"seam_uses", "", 0, 1000, "… so many times."}, seam_uses);
 }
 
 void KeyframeSchedule::add_view() {
@@ -31,15 +37,36 @@ void KeyframeSchedule::add_view() {
 void KeyframeSchedule::retire(int view) {
   std::erase(active_, view);
   std::erase(round_, view);
+  std::erase(revisits_, view);
+}
+
+void KeyframeSchedule::append(const KeyframeSchedule& other) {
+  for (const int view : other.active_) active_.push_back(num_views() + view);
+  uses_.insert(uses_.end(), other.uses_.begin(), other.uses_.end());
+  losses_.insert(losses_.end(), other.losses_.begin(), other.losses_.end());
+}
+
+void KeyframeSchedule::revisit(std::span<const int> views) {
+  for (const int view : views) {
+    if (!std::ranges::binary_search(active_, view)) continue;
+    std::erase(revisits_, view);
+    revisits_.insert(revisits_.end(), static_cast<size_t>(options_.seam_uses), view);
+  }
+}
+
+/// Takes one out at random.
+int KeyframeSchedule::take(std::vector<int>& views) {
+  const auto position = static_cast<size_t>(random_.index(static_cast<int>(views.size())));
+  const int view = views[position];
+  views[position] = views.back();
+  views.pop_back();
+  return view;
 }
 
 int KeyframeSchedule::draw() {
+  if (is_revisiting()) return take(revisits_);
   if (round_.empty()) round_ = active_;
-  const auto position = static_cast<size_t>(random_.index(static_cast<int>(round_.size())));
-  const int view = round_[position];
-  round_[position] = round_.back();
-  round_.pop_back();
-  return view;
+  return take(round_);
 }
 
 int KeyframeSchedule::draw_worse() {

@@ -19,13 +19,16 @@ struct ScheduleOptions {
   int online_level = 1;
   double newest_probability = 0.2;
   double worse_probability = 0;
+  double seam_px = 2.0;
+  int seam_uses = 10;
   void visit(OptionVisitor& visitor);
 };
 
 /// Which keyframe is trained next, and on which level of its pyramid (paper, Sec. 3.4, Eq. 5).
 ///
 /// Each keyframe starts at the coarsest level n = pyramid_levels and moves down one level every uses_per_level uses,
-/// until it reaches the finest one allowed: online_level while frames arrive, the full image in refinement.
+/// until it reaches the finest one allowed: online_level while frames arrive, the full image in refinement. Keyframes
+/// at which a correction of the map left a seam go before all others.
 class KeyframeSchedule {
  public:
   struct Choice {
@@ -38,9 +41,15 @@ class KeyframeSchedule {
   void add_view();
   /// This view does not come again.
   void retire(int view);
+  /// Adds all views of another, used as often as they were.
+  void append(const KeyframeSchedule& other);
   int num_views() const { return static_cast<int>(uses_.size()); }
   /// Those that are not retired, in order of arrival.
   std::span<const int> active() const { return active_; }
+
+  /// These views, but those that are retired, come seam_uses times each before the others go on.
+  void revisit(std::span<const int> views);
+  bool is_revisiting() const { return !revisits_.empty(); }
 
   /// The next view; there must be one. Views take turns at random, each once per round. In between comes, with
   /// newest_probability while online, the newest, and with worse_probability the one of larger loss out of two.
@@ -54,13 +63,15 @@ class KeyframeSchedule {
  private:
   int draw();
   int draw_worse();
+  int take(std::vector<int>& views);
 
   ScheduleOptions options_;
   Random random_;
   std::vector<int> uses_;
   std::vector<double> losses_;  // as last reported; views not trained yet come first
   std::vector<int> active_;
-  std::vector<int> round_;  // views still to come in this round
+  std::vector<int> round_;     // views still to come in this round
+  std::vector<int> revisits_;  // views that go before them, each as often as it is to come
 };
 
 }  // namespace photoslam

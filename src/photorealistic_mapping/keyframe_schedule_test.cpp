@@ -90,5 +90,23 @@ TEST(KeyframeSchedule, TheWorseViewOutOfTwoComes) {
   }
 }
 
+TEST(KeyframeSchedule, ViewsAtSeamsGoFirst) {
+  ScheduleOptions options;
+  options.seam_uses = 3;
+  KeyframeSchedule schedule(options, 5);
+  for (int i = 0; i < 10; ++i) schedule.add_view();
+  schedule.revisit(std::vector{2, 5});
+  EXPECT_EQ(schedule.next(true).view % 3, 2);
+  schedule.revisit(std::vector{5, 8});  // again: 5 has three uses left, no more
+  std::map<int, int> uses;
+  while (schedule.is_revisiting()) ++uses[schedule.next(true).view];
+  EXPECT_EQ(uses[5], 3);
+  EXPECT_EQ(uses[8], 3);
+  EXPECT_GE(uses[2], 2);
+  EXPECT_EQ(uses.size(), 3u);
+  for (int i = 0; i < 10; ++i) ++uses[schedule.next(true).view];
+  EXPECT_EQ(uses.size(), 10u) << "then a round of all";
+}
+
 }  // namespace
 }  // namespace photoslam

@@ -8,6 +8,7 @@
 #include "base/check.h"
 #include "image/convert.h"
 #include "math/median.h"
+#include "photorealistic_mapping/seams.h"
 #include "photorealistic_mapping/view_geometry.h"
 #include "photorealistic_mapping/view_redundancy.h"
 #include "photorealistic_mapping/world_export.h"
@@ -65,6 +66,7 @@ void PhotorealisticOptions::visit(OptionVisitor& v) {
   v.group("schedule", "Which keyframe is trained, at which resolution.", schedule);
   v.group("rates", "Step sizes of Adam.", rates);
   v.group("densification", "Split, clone and prune.", densification);
+  v.group("doubling", "What a loop brings together.", doubling);
   v.group("poses", "Photometric refinement of keyframe poses.", poses);
   v.group("exposure", "Brightness of each keyframe's picture.", exposure);
 }
@@ -82,16 +84,22 @@ PhotorealisticMapper::PhotorealisticMapper(const PhotorealisticOptions& options,
 
 void PhotorealisticMapper::update_poses(const MapSnapshot& map) {
   std::vector<double> depths;
+  std::vector<Sim3> before, after;
   for (size_t i = 0; i < anchors_from_world_.size(); ++i) {
+    before.push_back(anchor_from_world(anchors_from_world_[i], anchor_scales_[i]));
     const KeyframeView& keyframe = map.keyframe(KeyframeId(static_cast<int32_t>(i)));
     anchors_from_world_[i] = keyframe.keyframe.camera_from_world;
     if (keyframe.keyframe.scale != anchor_scales_[i]) {
       rescale(i, keyframe.keyframe.scale / anchor_scales_[i]);
       anchor_scales_[i] = keyframe.keyframe.scale;
     }
+    after.push_back(anchor_from_world(anchors_from_world_[i], anchor_scales_[i]));
     if (keyframe.median_depth > 0) depths.push_back(keyframe.median_depth);
   }
   if (!depths.empty()) scene_depth_ = lower_median(depths);
+  const std::vector<int> seams = find_seams(options_.schedule.seam_px, sensor_.camera, map, before);
+  merge_doubled(options_.doubling, before, after, seams, model_);
+  schedule_.revisit(seams);
 }
 
 void PhotorealisticMapper::rescale(size_t index, double factor) {
@@ -246,6 +254,16 @@ void PhotorealisticMapper::add_gaussians(std::span<const splatting::Gaussian> in
   model_.add(0, in_anchor, 0, static_cast<uint32_t>(iteration_));
 }
 
+void PhotorealisticMapper::append(PhotorealisticMapper other) {
+  anchors_from_world_.insert(anchors_from_world_.end(), other.anchors_from_world_.begin(),
+                             other.anchors_from_world_.end());
+  anchor_scales_.insert(anchor_scales_.end(), other.anchor_scales_.begin(), other.anchor_scales_.end());
+  std::ranges::move(other.views_, std::back_inserter(views_));
+  model_.append(other.model_);
+  schedule_.append(other.schedule_);
+  if (has_keyframes()) keep_image_budget();
+}
+
 splatting::TrainOptions PhotorealisticMapper::train_options(std::optional<double> progress) const {
   const double decay = progress ? std::pow(options_.rates.final_factor, *progress) : 1.0;
   splatting::TrainOptions train;
@@ -305,11 +323,11 @@ void PhotorealisticMapper::maintain(std::optional<double> progress, Executor& ex
   prune(options_.densification, scene_depth_, model_);
 }
 
-KeyframeComparison PhotorealisticMapper::compare_newest(Executor& executor) {
-  PHOTOSLAM_CHECK(has_keyframes(), "no keyframe yet");
-  render_picture(views_.size() - 1, executor);
-  apply(views_.back().exposure.exposure(), render_);
-  return {to_rgb(views_.back().picture.color), to_u8(to_image(render_))};
+KeyframeComparison PhotorealisticMapper::compare(size_t keyframe, Executor& executor) {
+  PHOTOSLAM_CHECK(keyframe < views_.size(), "keyframe {} of {}", keyframe, views_.size());
+  render_picture(keyframe, executor);
+  apply(views_[keyframe].exposure.exposure(), render_);
+  return {to_rgb(views_[keyframe].picture.color), to_u8(to_image(render_))};
 }
 
 FrozenMap PhotorealisticMapper::freeze() const {

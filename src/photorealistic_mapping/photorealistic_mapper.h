@@ -11,6 +11,7 @@
 #include "image/pyramid.h"
 #include "map/snapshot.h"
 #include "photorealistic_mapping/densification.h"
+#include "photorealistic_mapping/doubled_gaussians.h"
 #include "photorealistic_mapping/exposure_adjustment.h"
 #include "photorealistic_mapping/feature_depth.h"
 #include "photorealistic_mapping/keyframe_depth.h"
@@ -50,6 +51,7 @@ struct PhotorealisticOptions {
   ScheduleOptions schedule;
   LearningRateOptions rates;
   DensificationOptions densification;
+  DoublingOptions doubling;
   PoseAdjustmentOptions poses;
   ExposureOptions exposure;
   void visit(OptionVisitor& visitor);
@@ -97,13 +99,19 @@ class PhotorealisticMapper {
   /// Adds gaussians from elsewhere, given in the world frame, to the first keyframe; there must be one.
   void add_gaussians(std::span<const splatting::Gaussian> in_world);
 
+  /// Adds all that another mapper has come to, its keyframes counted on from those of this one.
+  void append(PhotorealisticMapper other);
+
   /// One training iteration, Eq. (4). At least one keyframe is needed. `progress` in [0, 1] says how much of the
   /// refinement is done; empty while frames arrive.
   splatting::StepResult train(std::optional<double> progress, Executor& executor);
 
-  /// The newest keyframe's picture at half the size, and what the map shows there now.
-  KeyframeComparison compare_newest(Executor& executor);
+  /// The picture of a keyframe that still has one, at half the size, and what the map shows there now.
+  KeyframeComparison compare(size_t keyframe, Executor& executor);
 
+  /// Whether the next iterations go to keyframes where a correction of the map left seams.
+  bool has_seams() const { return schedule_.is_revisiting(); }
+  size_t num_keyframes() const { return views_.size(); }
   bool has_keyframes() const { return !views_.empty(); }
   const splatting::GaussianModel& gaussians() const { return model_; }
   int num_iterations() const { return iteration_; }

@@ -13,11 +13,12 @@
 
 #include "base/check.h"
 #include "base/checked_file.h"
+#include "photorealistic_mapping/image_archive.h"
 
 namespace photoslam {
 namespace {
 
-constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 4, .oldest = 4};
+constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 5, .oldest = 5};
 
 /// Lets deflate or inflate work through the input; their counts have 32 bits.
 template <class Step>
@@ -70,7 +71,10 @@ std::optional<std::string> unpacked(std::string_view bytes) {
 }  // namespace
 
 void SessionHeader::serialize(Archive& a) {
-  a(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, bf, configuration);
+  PinholeCamera& c = sensor.camera;
+  a(c.width, c.height, c.fx, c.fy, c.cx, c.cy, sensor.metres_per_depth_unit, sensor.stereo_baseline_m);
+  serialize_image(a, sensor.mask);
+  a(bf, configuration);
 }
 
 Status write_session(const std::filesystem::path& path, const Archive& session) {
@@ -96,7 +100,7 @@ SessionHeader session_header(const std::string& session) {
 }
 
 Status check_session_camera(const SessionHeader& session, const PinholeCamera& camera) {
-  const PinholeCamera& c = session.camera;
+  const PinholeCamera& c = session.sensor.camera;
   const auto differs = [](double a, double b) { return std::abs(a - b) > 1e-6 * (1 + std::abs(a)); };
   if (c.width == camera.width && c.height == camera.height && !differs(c.fx, camera.fx) && !differs(c.fy, camera.fy) &&
       !differs(c.cx, camera.cx) && !differs(c.cy, camera.cy)) {

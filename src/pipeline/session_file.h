@@ -7,13 +7,13 @@
 
 #include "base/archive.h"
 #include "base/result.h"
-#include "camera/pinhole.h"
+#include "photorealistic_mapping/photorealistic_mapper.h"
 
 namespace photoslam {
 
 /// What a session says of itself before the map begins.
 struct SessionHeader {
-  PinholeCamera camera;       ///< Undistorted or rectified, as everything in the map sees the world.
+  MapperSensor sensor;        ///< Its camera is undistorted or rectified, as everything in the map sees the world.
   double bf = 0;              ///< fx * baseline [px m]; 0: one camera without depth.
   std::string configuration;  ///< TOML, for the record.
   void serialize(Archive& archive);

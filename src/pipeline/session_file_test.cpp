@@ -128,9 +128,9 @@ TEST_F(SessionTest, AutosavesAreWholeSessions) {
 
 TEST_F(SessionTest, AnotherCameraIsRefused) {
   const SessionHeader header = session_header(*bytes);
-  EXPECT_TRUE(check_session_camera(header, header.camera));
+  EXPECT_TRUE(check_session_camera(header, header.sensor.camera));
   EXPECT_NE(header.configuration.find("[localization"), std::string::npos);
-  PinholeCamera other = header.camera;
+  PinholeCamera other = header.sensor.camera;
   other.fx *= 1.01;
   const Status status = check_session_camera(header, other);
   ASSERT_FALSE(status);

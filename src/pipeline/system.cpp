@@ -148,7 +148,7 @@ void Session::load_session() {
 /// Header and geometric map; the photorealistic map follows.
 std::shared_ptr<Archive> Session::begin_session() {
   auto session = std::make_shared<Archive>();
-  SessionHeader header{localization_.camera(), localization_.bf(), config_as_toml(options_)};
+  SessionHeader header{localization_.sensor(), localization_.bf(), config_as_toml(options_)};
   (*session)(header, geometry_);
   last_save_s_ = clock_.seconds();
   return session;

@@ -90,6 +90,20 @@ Block& GaussianModel::append_block(int anchor) {
   return *blocks_.back();
 }
 
+void GaussianModel::append(const GaussianModel& other) {
+  bring_home();
+  other.bring_home();
+  const int num_own = num_anchors();
+  for (int i = 0; i < other.num_anchors(); ++i) add_anchor();
+  for (const auto& block : other.blocks_) {
+    const int anchor = num_own + block->anchor;
+    Block& copy = append_block(anchor);
+    copy = *block;
+    copy.anchor = anchor;
+  }
+  size_ += other.size_;
+}
+
 std::vector<size_t> GaussianModel::add(int anchor, std::span<const Gaussian> gaussians, uint32_t tag, uint32_t birth) {
   PHOTOSLAM_CHECK(anchor >= 0 && anchor < num_anchors(), "anchor {} of {}", anchor, num_anchors());
   std::vector<size_t> indices;

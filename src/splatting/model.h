@@ -99,6 +99,9 @@ class GaussianModel {
   /// The optimiser state and the statistics of the newcomers are zero. Returns the index of each newcomer.
   std::vector<size_t> add(int anchor, std::span<const Gaussian> gaussians, uint32_t tag = 0, uint32_t birth = 0);
 
+  /// Adds all of another model, its anchors counted on from those of this one.
+  void append(const GaussianModel& other);
+
   /// Number of gaussians.
   size_t size() const { return size_; }
   /// Number of gaussians of one anchor.

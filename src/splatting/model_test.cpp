@@ -121,6 +121,22 @@ TEST(GaussianModel, BoundsHoldEveryGaussian) {
   EXPECT_EQ(got, want);
 }
 
+TEST(GaussianModel, AppendedModelFollowsOnTheAnchors) {
+  GaussianModel model = make_model();
+  model.append(make_model());
+  EXPECT_EQ(model.num_anchors(), 6);
+  EXPECT_EQ(model.size(), 600u);
+  std::set<std::pair<int, uint32_t>> found;  // anchor, tag
+  model.for_each([&](size_t i) {
+    EXPECT_EQ(model.get(i).mean[0], static_cast<float>(model.tag(i)));
+    found.emplace(model.anchor(i), model.tag(i));
+  });
+  for (int i = 0; i < 300; ++i) {
+    EXPECT_TRUE(found.contains({i % 3, static_cast<uint32_t>(i)}));
+    EXPECT_TRUE(found.contains({3 + i % 3, static_cast<uint32_t>(i)}));
+  }
+}
+
 TEST(GaussianModel, RescalingAnAnchorScalesMeansAndDeviations) {
   GaussianModel model = make_model();
   model.rescale_anchor(1, 2);
