@@ -22,7 +22,7 @@ TEST(Module, SaysWhatIsMissingOrDamaged) {
   const auto unusable = find_in_module(damaged.filename().string(), "entry");
   fs::remove(damaged);
   ASSERT_FALSE(unusable.ok());
-  EXPECT_NE(unusable.error().message.find("("), std::string::npos) << unusable.error().message;
+  EXPECT_NE(unusable.error().message.find('('), std::string::npos) << unusable.error().message;
 }
 
 }  // namespace
