@@ -36,10 +36,9 @@ double current_rss_mb() {
   return 1e-6 * static_cast<double>(resident) * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-void lower_thread_priority() {
-  constexpr int kNice = 10;
+void lower_thread_priority(ThreadPriority priority) {
   const auto thread = static_cast<id_t>(syscall(SYS_gettid));
-  setpriority(PRIO_PROCESS, thread, kNice);  // on Linux a thread id selects that thread alone
+  setpriority(PRIO_PROCESS, thread, static_cast<int>(priority));  // on Linux a thread id selects that thread alone
 }
 
 }  // namespace photoslam

@@ -25,7 +25,12 @@ double process_cpu_seconds();
 double peak_rss_mb();
 /// Resident set now [MB]; 0 where the system does not tell.
 double current_rss_mb();
-/// Lowers the calling thread's scheduling priority for good (nice 10); without effect where not supported.
-void lower_thread_priority();
+/// How far a thread steps back behind those that track: its nice value.
+enum class ThreadPriority {
+  supporting = 4,   ///< Tracking needs the result soon: reading frames, geometry mapping.
+  background = 10,  ///< Whatever time is left.
+};
+/// Lowers the calling thread's scheduling priority for good; without effect where not supported.
+void lower_thread_priority(ThreadPriority priority);
 
 }  // namespace photoslam

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "base/clock.h"
+
 namespace photoslam {
 
 using std::chrono::steady_clock;
@@ -52,6 +54,8 @@ void FrameFeed::wait_until(SteadyTime due) {
 }
 
 void FrameFeed::read_all() {
+  // Frames are decoded well ahead of their time, so this never needs the core that tracks.
+  lower_thread_priority(ThreadPriority::supporting);
   try {
     while (!stop_.stop_requested()) {
       std::optional<Frame> frame = source_.next();

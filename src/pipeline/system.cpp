@@ -28,6 +28,8 @@ int num_threads(const RunSettings& settings) {
   return settings.threads > 0 ? settings.threads : cores;
 }
 
+void in_background() { lower_thread_priority(ThreadPriority::background); }
+
 /// A keyframe, or nothing: then loop closure has found a correction.
 using GeometryMessage = std::optional<NewKeyframe>;
 /// The map has changed.
@@ -50,7 +52,7 @@ class Session {
         outer_stop_(std::move(stop)),
         forward_stop_(outer_stop_, [this] { stop_.request_stop(); }),
         failures_(stop_),
-        executor_(num_threads(settings), lower_thread_priority),
+        executor_(num_threads(settings), in_background),
         localization_(options, settings, source.info()),
         geometry_(options.geometry_mapping, options.features, localization_.camera(), localization_.bf()),
         loop_closer_(options.loop_closure, options.features, localization_.camera(), localization_.bf()),
@@ -170,12 +172,13 @@ Stage<GeometryMessage>::Work Session::geometry_work() {
       take_correction();
     }
   };
-  return {.name = "geometry mapping", .handle = handle};
+  return {.name = "geometry mapping", .handle = handle, .on_start = [] {
+            lower_thread_priority(ThreadPriority::supporting);
+          }};
 }
 
 Stage<LoopMessage>::Work Session::loop_work() {
-  return {
-      .name = "loop closure", .handle = [this](LoopMessage) { look_for_loops(); }, .on_start = lower_thread_priority};
+  return {.name = "loop closure", .handle = [this](LoopMessage) { look_for_loops(); }, .on_start = in_background};
 }
 
 void Session::add_keyframe(NewKeyframe keyframe) {
@@ -241,7 +244,7 @@ Stage<MappingMessage>::Work Session::mapping_work() {
   work.name = "photorealistic mapping";
   work.handle = [this](MappingMessage message) { mapping_.handle(std::move(message)); };
   if (!logical_time_ && !settings_.localize_only) work.idle = [this] { return mapping_.train_while_idle(); };
-  work.on_start = lower_thread_priority;
+  work.on_start = in_background;
   return work;
 }
 
