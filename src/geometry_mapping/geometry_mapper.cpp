@@ -38,6 +38,7 @@ void GeometryMapperOptions::visit(OptionVisitor& v) {
   v.value({"max_landmark_depth_baselines", "", 1.0, 1000.0,
            "Depth, in baselines of the stereo or depth camera, up to which one view makes a landmark."},
           max_landmark_depth_baselines);
+  v.group("keyframe_culling", "When a keyframe becomes a mere anchor.", keyframe_culling);
   v.group("bundle", "The local bundle adjustment.", bundle);
 }
 
@@ -58,6 +59,7 @@ GeometryUpdate GeometryMapper::process(const KeyframeProposal& proposal, const s
   update.fused_landmarks = fuse_with_neighbours(proposal.id);
   update.moved_keyframes.push_back(proposal.id);
   update.bundle = adjust_locally(proposal.id, interrupted, update.moved_keyframes);
+  update.culled_keyframes = cull_keyframes(proposal.id);
   update.map = map_.snapshot();
   return update;
 }
@@ -95,7 +97,7 @@ void GeometryMapper::insert(const KeyframeProposal& proposal) {
       proposal.reference.valid() ? proposal.camera_from_reference * map_.keyframe(proposal.reference).camera_from_world
                                  : proposal.camera_from_reference;
   map_.add_keyframe(proposal.id, proposal.frame, camera_from_world);
-  map_.set_parent(proposal.id, proposal.reference);
+  if (proposal.reference.valid()) map_.set_parent(proposal.id, map_.living(proposal.reference));
   for (const auto& [id, sighting] : proposal.sightings) map_.count_sightings(id, sighting.visible, sighting.found);
   for (size_t i = 0; i < proposal.landmarks.size(); ++i) {
     const LandmarkId id = living(proposal.landmarks[i]);
@@ -331,6 +333,21 @@ BundleSummary GeometryMapper::adjust_locally(KeyframeId id, const std::function<
   remove_outliers();
   for (const LandmarkId landmark : problem_landmarks_) map_.update_view(landmark);
   return summary;
+}
+
+/// Among those that see what the current keyframe sees.
+int GeometryMapper::cull_keyframes(KeyframeId current) {
+  const KeyframeCullingOptions& options = options_.keyframe_culling;
+  if (!options.enabled) return 0;
+  int culled = 0;
+  for (const auto& neighbour : map_.covisible_keyframes(current, kMinCovisible)) {
+    const KeyframeId id = neighbour.keyframe;
+    const bool stays = !map_.keyframe(id).parent.valid() || current.value - id.value < options.min_age_keyframes;
+    if (stays || !is_redundant(options, map_, id)) continue;
+    map_.cull_keyframe(id);
+    ++culled;
+  }
+  return culled;
 }
 
 void GeometryMapper::remove_outliers() {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/options.h"
+#include "geometry_mapping/keyframe_culling.h"
 #include "localization/landmark_projection.h"
 #include "localization/tracker.h"
 #include "map/map.h"
@@ -24,6 +25,7 @@ struct GeometryMapperOptions {
   double fusion_radius_px = 3.0;
   double min_found_ratio = 0.25;
   double max_landmark_depth_baselines = 30.0;
+  KeyframeCullingOptions keyframe_culling;
   BundleOptions bundle;
   void visit(OptionVisitor& visitor);
 };
@@ -34,7 +36,7 @@ struct GeometryUpdate {
   std::shared_ptr<const MapSnapshot> map;
   std::vector<KeyframeId> moved_keyframes;  ///< Poses that differ from the snapshot before, the new one included.
   BundleSummary bundle;
-  int new_landmarks = 0, fused_landmarks = 0, culled_landmarks = 0;
+  int new_landmarks = 0, fused_landmarks = 0, culled_landmarks = 0, culled_keyframes = 0;
 };
 
 /// Geometry mapping: grows the map by keyframes and landmarks and keeps it consistent by local bundle adjustment over
@@ -75,6 +77,7 @@ class GeometryMapper {
   BundleSummary adjust_locally(KeyframeId id, const std::function<bool()>& interrupted, std::vector<KeyframeId>& moved);
   void build_local_problem(KeyframeId id);
   void remove_outliers();
+  int cull_keyframes(KeyframeId current);
 
   GeometryMapperOptions options_;
   PinholeCamera camera_;

@@ -4,6 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <numbers>
+
 #include "map/testing/point_world.h"
 #include "math/umeyama.h"
 
@@ -16,13 +19,22 @@ using testing::PointWorld;
 class WalkTest : public ::testing::Test {
  protected:
   void walk(PointWorld& world, int num_frames, double start_s = 0) {
+    begin(world);
+    follow(world, 0, num_frames, 30, [&](int frame) { return PointWorld::camera_from_world(start_s + frame / 30.0); });
+  }
+
+  void begin(const PointWorld& world) {
     const double bf = world.with_depth ? world.bf : 0;
-    Tracker tracker({}, {}, world.camera, bf);
+    tracker.emplace(TrackerOptions{}, OrbOptions{}, world.camera, bf);
     mapper.emplace(GeometryMapperOptions{}, OrbOptions{}, world.camera, bf);
-    std::shared_ptr<const MapSnapshot> snapshot;
-    for (int frame = 0; frame < num_frames; ++frame) {
-      const SE3 truth = PointWorld::camera_from_world(start_s + frame / 30.0);
-      const TrackingResult result = tracker.track(world.observe(truth, frame), snapshot, true);
+    snapshot.reset();
+  }
+
+  void follow(PointWorld& world, int first, int last, double frames_per_second,
+              const std::function<SE3(int)>& camera_from_world) {
+    for (int frame = first; frame < last; ++frame) {
+      const SE3 truth = camera_from_world(frame);
+      const TrackingResult result = tracker->track(world.observe(truth, frame, frames_per_second), snapshot, true);
       if (frames.empty() && result.state == TrackingState::initializing) continue;
       ASSERT_TRUE(result.has_pose) << "frame " << frame << ": " << result.reason;
       frames.push_back({truth, result.reference, result.camera_from_reference});
@@ -30,6 +42,14 @@ class WalkTest : public ::testing::Test {
       updates.push_back(mapper->process(*result.keyframe));
       snapshot = updates.back().map;
     }
+  }
+
+  int num_living_keyframes() const {
+    int living = 0;
+    for (size_t k = 0; k < mapper->map().num_keyframes(); ++k) {
+      living += !mapper->map().keyframe(KeyframeId(static_cast<int32_t>(k))).culled;
+    }
+    return living;
   }
 
   double final_rmse() const {
@@ -63,7 +83,9 @@ class WalkTest : public ::testing::Test {
     KeyframeId reference;
     SE3 camera_from_reference;
   };
+  std::optional<Tracker> tracker;
   std::optional<GeometryMapper> mapper;
+  std::shared_ptr<const MapSnapshot> snapshot;
   std::vector<GeometryUpdate> updates;
   std::vector<TrackedFrame> frames;
 };
@@ -101,7 +123,7 @@ TEST_F(WalkTest, ASingleCameraGivesTheSameMapUpToItsScale) {
   PointWorld world;
   world.with_depth = false;
   walk(world, 150, kCornerInView);
-  EXPECT_GT(frames.size(), 140u) << "parallax comes within ten frames";
+  EXPECT_GT(frames.size(), 130u) << "parallax, and certainty which motion it means, come within twenty frames";
   EXPECT_LT(final_rmse_with_scale(), 1e-4);
   // Landmarks of the parts that the first two views did not see were triangulated later.
   int late = 0;
@@ -117,7 +139,7 @@ TEST_F(WalkTest, ASingleCameraToleratesNoise) {
   world.with_depth = false;
   world.pixel_noise = 0.5;
   walk(world, 150, kCornerInView);
-  EXPECT_GT(frames.size(), 130u);
+  EXPECT_GT(frames.size(), 120u);
   double path = 0;
   for (size_t i = 1; i < frames.size(); ++i) {
     path += (frames[i].truth.inverse().translation - frames[i - 1].truth.inverse().translation).norm();
@@ -140,6 +162,24 @@ TEST_F(WalkTest, LandmarksAreNotDuplicated) {
     if (landmarks_of_descriptor[landmark.view.descriptor[0]]++ > 0) ++duplicates;
   }
   EXPECT_LT(duplicates, alive / 50);
+}
+
+TEST_F(WalkTest, KeyframesOfAPlaceThatIsVisitedAgainAndAgainAreCulled) {
+  PointWorld world;
+  world.pixel_noise = 0.5;
+  constexpr int kLap = 90, kLaps = 4;
+  const auto lap = [](int frame) {
+    const double angle = 2 * std::numbers::pi * frame / kLap;
+    const Vec3 position(0.7 * std::sin(angle), 0, 0.7 * std::cos(angle) - 0.7);
+    return SE3(so3_exp(Vec3(0, 0.6 * std::sin(angle), 0)), position).inverse();
+  };
+  begin(world);
+  follow(world, 0, kLap, 10, lap);
+  const int after_one_lap = num_living_keyframes();
+  follow(world, kLap, kLaps * kLap, 10, lap);
+  EXPECT_LT(num_living_keyframes(), 1.3 * after_one_lap);
+  EXPECT_GT(mapper->map().num_keyframes(), 2 * static_cast<size_t>(after_one_lap));
+  EXPECT_LT(final_rmse(), 0.01);
 }
 
 TEST_F(WalkTest, TheSameInputGivesTheSameMap) {

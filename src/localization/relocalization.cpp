@@ -45,10 +45,15 @@ void Relocalizer::update(const MapSnapshot& map) {
 std::optional<Relocalization> Relocalizer::relocalize(const MapSnapshot& map, const FeatureFrame& frame,
                                                       KeyframeId likely) {
   std::vector<KeyframeId> candidates;
-  if (map.has(likely)) candidates.push_back(likely);
+  const auto propose = [&](KeyframeId id) {
+    if (!map.has(id)) return;
+    const Keyframe& keyframe = map.keyframe(id).keyframe;
+    if (keyframe.culled) id = keyframe.parent;  // what it saw is seen from there
+    if (std::ranges::find(candidates, id) == candidates.end()) candidates.push_back(id);
+  };
+  propose(likely);
   for (const PlaceCandidate& place : places_.query(strongest(frame.features), options_.max_candidates)) {
-    const KeyframeId id(place.place);
-    if (map.has(id) && id != likely) candidates.push_back(id);
+    propose(KeyframeId(place.place));
   }
   for (const KeyframeId candidate : candidates) {
     if (const auto pose = pose_against(map, frame, candidate)) return Relocalization{*pose, candidate};

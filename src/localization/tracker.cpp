@@ -309,6 +309,7 @@ std::vector<KeyframeId> Tracker::local_keyframes(const SE3& camera_from_world) c
   constexpr double kOverlap = 2.0;  // views farther apart than this (see view_distance) hardly share landmarks
   std::vector<std::pair<double, KeyframeId>> candidates;
   for (const auto& view : map_->keyframes) {
+    if (view->keyframe.culled) continue;
     const double distance = view_distance(camera_from_world, view->keyframe.camera_from_world, view->median_depth);
     if (distance < kOverlap) candidates.emplace_back(distance, view->keyframe.id);
   }

@@ -26,8 +26,9 @@ Problem::Problem(const MapSnapshot& map, bool scale_is_known) {
     const Keyframe& keyframe = view->keyframe;
     bundle.camera_from_world.push_back(keyframe.camera_from_world);
     const bool is_root = !keyframe.parent.valid();
-    const bool holds_scale = !is_root && !scale_is_known && !map.keyframe(keyframe.parent).keyframe.parent.valid();
-    bundle.pose_is_fixed.push_back(is_root || holds_scale ? 1 : 0);
+    const bool holds_scale =
+        !is_root && !keyframe.culled && !scale_is_known && !map.keyframe(keyframe.parent).keyframe.parent.valid();
+    bundle.pose_is_fixed.push_back(is_root || holds_scale || keyframe.culled ? 1 : 0);
     if (holds_scale) scale_is_known = true;
     for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
       LandmarkId id = keyframe.landmarks[i];

@@ -39,8 +39,10 @@ struct Keyframe {
   SE3 camera_from_world;
   std::vector<LandmarkId> landmarks;  ///< [N] landmark seen by each keypoint; invalid where there is none.
   KeyframeId parent;                  ///< Spanning tree: the keyframe it shared most landmarks with at birth.
-  double scale = 1.0;  ///< Present unit of the camera frame in units of the one at birth: what was measured then grows
-                       ///< by this factor. Only loops of a monocular camera change it.
+  double scale = 1.0;   ///< Present unit of the camera frame in units of the one at birth: what was measured then grows
+                        ///< by this factor. Only loops of a monocular camera change it.
+  bool culled = false;  ///< It lost its features and landmarks, and follows its parent.
+  SE3 from_parent;      ///< Of a culled keyframe: camera_from_parent, fixed in units of the present.
 };
 
 }  // namespace photoslam

@@ -56,8 +56,11 @@ Landmark& Map::mutable_landmark(LandmarkId id) {
 Keyframe& Map::add_keyframe(KeyframeId id, std::shared_ptr<const FeatureFrame> frame, const SE3& camera_from_world) {
   PHOTOSLAM_CHECK(static_cast<size_t>(id.value) == keyframes_.size(), "keyframe {} after {}", id.value,
                   keyframes_.size());
-  std::vector<LandmarkId> none(frame->size());
-  keyframes_.push_back({id, std::move(frame), camera_from_world, std::move(none), KeyframeId{}, 1.0});
+  Keyframe& keyframe = keyframes_.emplace_back();
+  keyframe.id = id;
+  keyframe.landmarks.resize(frame->size());
+  keyframe.frame = std::move(frame);
+  keyframe.camera_from_world = camera_from_world;
   return mutable_keyframe(id);
 }
 
@@ -140,22 +143,67 @@ void Map::set_position(LandmarkId id, const Vec3& position) { mutable_landmark(i
 
 void Map::set_pose(KeyframeId id, const SE3& camera_from_world) {
   mutable_keyframe(id).camera_from_world = camera_from_world;
+  const auto anchors = anchors_.find(id);
+  if (anchors == anchors_.end()) return;
+  for (const KeyframeId anchor : anchors->second) {
+    mutable_keyframe(anchor).camera_from_world = keyframe(anchor).from_parent * camera_from_world;
+  }
+}
+
+/// From now on the culled keyframe moves with this parent.
+void Map::tie(KeyframeId anchor, KeyframeId parent) {
+  Keyframe& tied = mutable_keyframe(anchor);
+  tied.parent = parent;
+  tied.from_parent = tied.camera_from_world * keyframe(parent).camera_from_world.inverse();
+  anchors_[parent].push_back(anchor);
+}
+
+void Map::cull_keyframe(KeyframeId id) {
+  Keyframe& culled = mutable_keyframe(id);
+  PHOTOSLAM_CHECK(culled.parent.valid() && !culled.culled, "keyframe {}", id.value);
+  for (const LandmarkId landmark : std::vector<LandmarkId>(culled.landmarks)) {
+    if (!landmark.valid()) continue;
+    remove_observation(landmark, id);
+    update_view(landmark);
+  }
+  auto without_features = std::make_shared<FeatureFrame>();
+  without_features->frame = culled.frame->frame;
+  without_features->timestamp_ns = culled.frame->timestamp_ns;
+  culled.frame = std::move(without_features);
+  culled.culled = true;
+
+  tie(id, culled.parent);
+  if (auto own = anchors_.extract(id)) {
+    for (const KeyframeId anchor : own.mapped()) tie(anchor, culled.parent);
+  }
+  for (const Keyframe& other : keyframes_) {
+    if (other.parent == id) set_parent(other.id, culled.parent);
+  }
 }
 
 void Map::apply(const MapCorrection& correction) {
   ++num_corrections_;
   if (correction.new_world_from_old_world.empty()) return;
   std::vector<Sim3> moves;  // [K] new_world_from_old_world
-  for (Keyframe& keyframe : keyframes_) {
+  for (const Keyframe& keyframe : keyframes_) {
     const auto id = static_cast<size_t>(keyframe.id.value);
     if (id < correction.new_world_from_old_world.size()) {
       moves.push_back(correction.new_world_from_old_world[id]);
     } else {
       moves.push_back(keyframe.parent.valid() ? moves[static_cast<size_t>(keyframe.parent.value)] : Sim3{});
     }
-    const Sim3 camera_from_new_world = Sim3(keyframe.camera_from_world) * moves.back().inverse();
-    set_pose(keyframe.id, camera_from_new_world.rigid());
-    keyframe.scale *= moves.back().scale;
+  }
+  for (const auto& [parent, anchors] : anchors_) {
+    const Sim3& move = moves[static_cast<size_t>(parent.value)];
+    for (const KeyframeId anchor : anchors) {
+      moves[static_cast<size_t>(anchor.value)] = move;
+      mutable_keyframe(anchor).from_parent.translation *= move.scale;
+    }
+  }
+  for (Keyframe& keyframe : keyframes_) {
+    const Sim3& move = moves[static_cast<size_t>(keyframe.id.value)];
+    keyframe.scale *= move.scale;
+    if (!keyframe.culled) set_pose(keyframe.id, (Sim3(keyframe.camera_from_world) * move.inverse()).rigid());
   }
   for (size_t i = 0; i < landmarks_.size(); ++i) {
     if (!landmarks_[i].view.alive) continue;
@@ -169,7 +217,7 @@ void Map::apply(const MapCorrection& correction) {
     set_position(id, position);
     update_view(id);
   }
-  for (const auto& [child, parent] : correction.new_parents) set_parent(child, parent);
+  for (const auto& [child, parent] : correction.new_parents) set_parent(child, living(parent));
 }
 
 void Map::append(const Map& other) {
@@ -184,6 +232,7 @@ void Map::append(const Map& other) {
     count_on(keyframe.parent);
     std::ranges::for_each(keyframe.landmarks, count_on);
     changed_keyframes_.insert(keyframe.id);
+    if (keyframe.culled) anchors_[keyframe.parent].push_back(keyframe.id);
     keyframes_.push_back(std::move(keyframe));
   }
   for (Landmark landmark : other.landmarks_) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <deque>
+#include <map>
 #include <memory>
 #include <set>
 #include <span>
@@ -40,7 +41,8 @@ class Map {
   void update_view(LandmarkId landmark);
   void set_position(LandmarkId landmark, const Vec3& position);
   void set_pose(KeyframeId keyframe, const SE3& camera_from_world);
-  /// Moves everything as the correction says; what was added since it was computed follows its ancestors.
+  /// Moves everything as the correction says (culled keyframes with their parents); what was added since it was
+  /// computed follows its ancestors.
   void apply(const MapCorrection& correction);
 
   size_t num_keyframes() const { return keyframes_.size(); }
@@ -50,6 +52,11 @@ class Map {
   /// Counts sightings by tracked frames.
   void count_sightings(LandmarkId id, int visible, int found);
   void set_parent(KeyframeId keyframe, KeyframeId parent) { mutable_keyframe(keyframe).parent = parent; }
+  /// Takes the keyframe out of geometry: it observes nothing any more, and follows its parent as an anchor of what was
+  /// measured in its frame. Its children become its parent's. Not for the root of a spanning tree.
+  void cull_keyframe(KeyframeId keyframe);
+  /// The keyframe, or the parent that it follows since it was culled.
+  KeyframeId living(KeyframeId id) const { return keyframe(id).culled ? keyframe(id).parent : id; }
 
   /// Keyframes sharing at least `min_shared` landmarks with this one, strongest first, ties by id.
   std::vector<CovisibleKeyframe> covisible_keyframes(KeyframeId id, int min_shared) const;
@@ -65,13 +72,15 @@ class Map {
 
  private:
   Keyframe& mutable_keyframe(KeyframeId id);
+  void tie(KeyframeId anchor, KeyframeId parent);
   Landmark& mutable_landmark(LandmarkId id);
 
   double scale_factor_;
   int num_levels_;
   std::deque<Keyframe> keyframes_;
   std::deque<Landmark> landmarks_;
-  std::set<KeyframeId> changed_keyframes_;  // since the last snapshot
+  std::map<KeyframeId, std::vector<KeyframeId>> anchors_;  // culled keyframes by their parents, which are not culled
+  std::set<KeyframeId> changed_keyframes_;                 // since the last snapshot
   std::set<int> changed_chunks_;
   int num_corrections_ = 0;
   std::shared_ptr<const MapSnapshot> published_;

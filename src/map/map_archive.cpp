@@ -28,11 +28,17 @@ void Map::serialize(Archive& a, int image_width, int image_height) {
     Keyframe& k = keyframes_[i];
     FeatureFrame frame;
     if (!a.reading()) frame = *k.frame;
-    a(k.id, frame, k.camera_from_world, k.landmarks, k.parent, k.scale);
+    a(k.id, frame, k.camera_from_world, k.landmarks, k.parent, k.scale, k.culled, k.from_parent);
     if (!a.reading()) continue;
     frame.grid.build(frame.features.keypoints, image_width, image_height);
     k.frame = std::make_shared<const FeatureFrame>(std::move(frame));
     changed_keyframes_.insert(k.id);
+  }
+  if (a.reading()) {
+    anchors_.clear();
+    for (const Keyframe& k : keyframes_) {
+      if (k.culled) anchors_[k.parent].push_back(k.id);
+    }
   }
   landmarks_.resize(a.count(landmarks_.size()));
   for (size_t i = 0; i < landmarks_.size(); ++i) {

@@ -150,6 +150,50 @@ TEST_F(MapTest, ViewOfALandmarkFollowsItsObservers) {
 }
 
 /// Two keyframes that see the same points, and a third one made after the second.
+TEST_F(MapTest, ACulledKeyframeSeesNothingAndFollowsItsParent) {
+  for (int k = 1; k < 4; ++k) map.set_parent(KeyframeId(k), KeyframeId(k - 1));
+  const LandmarkId shared = map.add_landmark(Vec3(0, 0, 3), KeyframeId(1), 0);
+  map.add_observation(shared, KeyframeId(2), 0);
+  const LandmarkId lonely = map.add_landmark(Vec3(0, 0, 3), KeyframeId(2), 1);
+  const auto pose = [&](int k) { return map.keyframe(KeyframeId(k)).camera_from_world; };
+
+  map.cull_keyframe(KeyframeId(2));
+  map.cull_keyframe(KeyframeId(1));
+  expect_consistent(map);
+  EXPECT_FALSE(map.landmark(shared).view.alive);
+  EXPECT_FALSE(map.landmark(lonely).view.alive);
+  EXPECT_EQ(map.keyframe(KeyframeId(2)).frame->size(), 0u);
+  EXPECT_EQ(map.keyframe(KeyframeId(2)).frame->timestamp_ns, world.observe(SE3{}, 2)->timestamp_ns);
+  for (int k = 1; k < 4; ++k) EXPECT_EQ(map.keyframe(KeyframeId(k)).parent, KeyframeId(0));
+  EXPECT_EQ(map.living(KeyframeId(2)), KeyframeId(0));
+
+  const SE3 before = pose(2) * pose(0).inverse(), free_before = pose(3);
+  map.set_pose(KeyframeId(0), SE3(so3_exp(Vec3(0.1, -0.2, 0.3)), Vec3(1, 2, 3)));
+  EXPECT_LT((pose(2) * pose(0).inverse() * before.inverse()).log().norm(), 1e-12);
+  EXPECT_LT((pose(3) * free_before.inverse()).log().norm(), 1e-15);
+}
+
+TEST_F(MapTest, ACorrectionMovesCulledKeyframesWithTheirParentAtItsScale) {
+  for (int k = 1; k < 4; ++k) map.set_parent(KeyframeId(k), KeyframeId(0));
+  map.cull_keyframe(KeyframeId(2));
+  const auto relative = [&] {
+    return map.keyframe(KeyframeId(2)).camera_from_world * map.keyframe(KeyframeId(0)).camera_from_world.inverse();
+  };
+  const SE3 before = relative();
+  MapCorrection correction;
+  const Sim3 of_parent(1.7, so3_exp(Vec3(0.2, 0.1, -0.3)), Vec3(0.5, -1, 2));
+  correction.new_world_from_old_world = {of_parent, Sim3{}, Sim3{}, Sim3{}};
+  map.apply(correction);
+  EXPECT_LT((relative().translation - 1.7 * before.translation).norm(), 1e-12);
+  EXPECT_LT(so3_log(relative().rotation * before.rotation.inverse()).norm(), 1e-12);
+  EXPECT_DOUBLE_EQ(map.keyframe(KeyframeId(2)).scale, 1.7);
+  EXPECT_DOUBLE_EQ(map.keyframe(KeyframeId(1)).scale, 1.0);
+  // And it still follows.
+  const SE3 corrected = relative();
+  map.set_pose(KeyframeId(0), SE3(so3_exp(Vec3(0.1, 0, 0)), Vec3(1, 0, 0)));
+  EXPECT_LT((relative() * corrected.inverse()).log().norm(), 1e-12);
+}
+
 class CorrectedMap : public ::testing::Test {
  protected:
   CorrectedMap() {
