@@ -115,9 +115,8 @@ void TwoViewOptions::visit(OptionVisitor& v) {
   v.value({"sigma_px", "px", 0.1, 100, "Standard deviation of a keypoint on the finest pyramid level."}, sigma_px);
   v.value({"min_parallax_deg", "deg", 0.1, 45, "Angle between the rays of the two views …"}, min_parallax_deg);
   v.value({"min_points", "", 10, 10000, "… that at least so many reconstructed points have."}, min_points);
-  v.value({"max_homography_share", "", 0, 1, "Share of the homography in both scores that marks a plane."},
-          max_homography_share);
-  v.value({"max_ambiguity", "", 0, 1, "Support of the second best motion, relative to the best."}, max_ambiguity);
+  v.value({"min_support", "", 0, 1, "Points of a motion that is looked at closely, relative to the best one."},
+          min_support);
 }
 
 namespace {
@@ -137,35 +136,30 @@ class TwoViews {
 
   TwoViewResult run() {
     TwoViewResult result;
-    result.points.resize(a_.size());
-    result.good.assign(a_.size(), 0);
     if (static_cast<int>(a_.size()) < options_.min_points) return refuse(result, "too few matches");
     Random random(1);
     const Model homography = best_model(random, 4, fit_homography, &TwoViews::score_homography);
     const Model essential = best_model(random, 8, fit_essential, &TwoViews::score_essential);
-    result.from_homography = homography.score > options_.max_homography_share * (homography.score + essential.score);
-    const auto motions =
-        result.from_homography ? motions_from_homography(homography.matrix) : motions_from_essential(essential.matrix);
-    const std::vector<uint8_t>& inlier = result.from_homography ? homography.inlier : essential.inlier;
-    int best = 0, second = 0;
-    for (const SE3& motion : motions) {
-      TwoViewResult candidate = result;
-      const int count = reconstruct(motion, inlier, candidate);
-      if (count > best) {
-        second = best;
-        best = count;
-        candidate.b_from_a = motion;
-        best_ = std::move(candidate);
-      } else {
-        second = std::max(second, count);
-      }
+    result.plane_scores = homography.score > essential.score;
+    std::vector<TwoViewMotion> tried;
+    for (const SE3& motion : motions_from_homography(homography.matrix)) tried.push_back(reconstruct(motion));
+    const auto num_of_plane = static_cast<std::ptrdiff_t>(tried.size());
+    for (const SE3& motion : motions_from_essential(essential.matrix)) tried.push_back(reconstruct(motion));
+    if (!result.plane_scores) std::rotate(tried.begin(), tried.begin() + num_of_plane, tried.end());
+    std::ranges::stable_sort(tried, std::greater{}, &TwoViewMotion::num_good);
+    const TwoViewMotion& best = tried.front();
+    if (best.num_good == 0) return refuse(result, "the camera only turned");
+    if (best.num_good < options_.min_points) return refuse(result, "too few points");
+    const double least = std::max<double>(options_.min_points, options_.min_support * best.num_good);
+    double parallax_deg = 0;
+    for (TwoViewMotion& motion : tried) {
+      if (motion.num_good < least) continue;
+      parallax_deg = std::max(parallax_deg, motion.parallax_deg);
+      result.motions.push_back(std::move(motion));
     }
-    if (best == 0) return refuse(result, "the camera only turned");
-    if (best < options_.min_points) return refuse(best_, "too few points");
-    if (best_.parallax_deg < options_.min_parallax_deg) return refuse(best_, "too little parallax");
-    if (second > options_.max_ambiguity * best) return refuse(best_, "two motions are possible");
-    best_.success = true;
-    return best_;
+    if (parallax_deg < options_.min_parallax_deg) return refuse(result, "too little parallax");
+    result.success = true;
+    return result;
   }
 
  private:
@@ -251,27 +245,27 @@ class TwoViews {
     return sum;
   }
 
-  /// Triangulates what the model explains; returns the number of points that lie in front of both cameras.
-  int reconstruct(const SE3& b_from_a, const std::vector<uint8_t>& inlier, TwoViewResult& result) const {
+  /// Triangulates all matches; keeps the points that lie in front of both cameras.
+  TwoViewMotion reconstruct(const SE3& b_from_a) const {
+    TwoViewMotion motion{b_from_a, std::vector<Vec3>(a_.size()), std::vector<uint8_t>(a_.size(), 0)};
     const Vec3 center_b = b_from_a.inverse().translation;
     std::vector<double> parallax;
     for (size_t i = 0; i < a_.size(); ++i) {
-      if (!inlier[i]) continue;
       constexpr TriangulationLimits kLimits{.min_parallax = 1e-5, .max_chi2 = 2 * kChi2Point};
       const auto point =
           triangulate(camera_, {SE3{}, pixels_a_[i], sigma_px_[i]}, {b_from_a, pixels_b_[i], sigma_px_[i]}, kLimits);
       if (!point) continue;
-      result.points[i] = *point;
-      result.good[i] = 1;
+      motion.points[i] = *point;
+      motion.good[i] = 1;
       parallax.push_back(parallax_angle(*point, Vec3::Zero(), center_b) * 180 / std::numbers::pi);
     }
-    const int count = static_cast<int>(parallax.size());
-    if (count >= options_.min_points) {
+    motion.num_good = static_cast<int>(parallax.size());
+    if (motion.num_good >= options_.min_points) {
       const auto nth = parallax.begin() + options_.min_points - 1;
       std::ranges::nth_element(parallax, nth, std::greater{});
-      result.parallax_deg = *nth;
+      motion.parallax_deg = *nth;
     }
-    return count;
+    return motion;
   }
 
   const TwoViewOptions& options_;
@@ -280,7 +274,6 @@ class TwoViews {
   std::vector<Vec2> a_, b_;       // on the plane z = 1
   std::vector<double> sigma_px_;  // [px]
   std::vector<double> sigma_;     // on the plane z = 1
-  TwoViewResult best_;
 };
 
 }  // namespace

@@ -29,27 +29,34 @@ std::vector<SE3> motions_from_homography(const Mat3& homography);
 
 struct TwoViewOptions {
   int max_iterations = 200;
-  double sigma_px = 1.0;              ///< Of a keypoint on the finest pyramid level.
-  double min_parallax_deg = 1.0;      ///< Angle between the two rays to a point …
-  int min_points = 50;                ///< … that at least so many points have.
-  double max_homography_share = 0.5;  ///< Above this share of the scores the scene is taken for a plane.
-  double max_ambiguity = 0.75;        ///< Points in front of both cameras in the second best motion over the best.
+  double sigma_px = 1.0;          ///< Of a keypoint on the finest pyramid level.
+  double min_parallax_deg = 1.0;  ///< Angle between the two rays to a point …
+  int min_points = 50;            ///< … that at least so many points have.
+  double min_support = 0.5;       ///< Points of a motion that is worth a closer look, over those of the best.
   void visit(OptionVisitor& visitor);
+};
+
+/// A motion and the points that it puts in front of both cameras.
+struct TwoViewMotion {
+  SE3 b_from_a;               ///< Translation of unit length.
+  std::vector<Vec3> points;   ///< [N] in the frame of camera a, where reconstructed.
+  std::vector<uint8_t> good;  ///< [N] whether it was.
+  int num_good = 0;
+  double parallax_deg = 0;  ///< That of the min_points-th best point.
 };
 
 struct TwoViewResult {
   bool success = false;
-  std::string reason;  ///< Why there is no success.
-  bool from_homography = false;
-  SE3 b_from_a;               ///< Translation of unit length.
-  std::vector<Vec3> points;   ///< [N] in the frame of camera a, where reconstructed.
-  std::vector<uint8_t> good;  ///< [N] whether it was.
-  double parallax_deg = 0;    ///< That of the min_points-th best point.
+  std::string reason;         ///< Why there is no success.
+  bool plane_scores = false;  ///< Whether the homography explains the matches better than the essential matrix.
+  /// Different motions that explain them nearly equally well, the one with most points first.
+  std::vector<TwoViewMotion> motions;
 };
 
-/// Relative pose and structure from two views alone. RANSAC fits a homography and an essential matrix; their scores
-/// decide which of them is decomposed, points in front of both cameras which motion is meant. Refused: a pure rotation,
-/// too little parallax, planes that allow two motions. Deterministic.
+/// Relative pose and structure from two views alone. RANSAC fits a homography and an essential matrix; the motions of
+/// both are tried on all matches. Which of them is meant, counting points in front of both cameras cannot always tell:
+/// a plane has two motions, and what lies near a plane makes the essential matrix arbitrary. Refused: a pure rotation,
+/// too little parallax. Deterministic.
 ///
 /// Pixels of camera a and b correspond; sigmas [px] per correspondence relative to sigma_px.
 TwoViewResult reconstruct_two_views(const TwoViewOptions& options, const PinholeCamera& camera,

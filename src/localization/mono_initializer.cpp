@@ -10,12 +10,26 @@
 
 namespace photoslam {
 
+namespace {
+
+/// Whether two motions, each of a length of its own, are more than different estimates of the same one.
+bool are_apart(const SE3& a, const SE3& b) {
+  constexpr double kTurn = 0.01, kDirection = 0.95;  // [rad], cosine
+  return so3_log(a.rotation * b.rotation.inverse()).norm() > kTurn ||
+         a.translation.normalized().dot(b.translation.normalized()) < kDirection;
+}
+
+}  // namespace
+
 void MonoInitializerOptions::visit(OptionVisitor& v) {
   v.value({"search_radius", "", 0.01, 1.0, "How far a point may move between the two views, in image widths."},
           search_radius);
   v.value({"min_matches", "", 10, 10000, "Matches that the first view keeps; with fewer another one is chosen."},
           min_matches);
   v.value({"max_gap_s", "s", 0.1, 100.0, "Longest time between the two views."}, max_gap_s);
+  v.value({"min_score_lead", "", 0, 1,
+           "Where two motions are possible, the share by which one must fit better than the other."},
+          min_score_lead);
   v.group("two_view", "Structure and motion from two views.", two_view);
 }
 
@@ -52,7 +66,21 @@ std::optional<InitialPair> MonoInitializer::add(const std::shared_ptr<const Feat
     reason = views.reason;
     return std::nullopt;
   }
-  return refined(*frame, views, reason);
+  std::vector<Refined> found;
+  for (const TwoViewMotion& motion : views.motions) found.push_back(refined(*frame, motion));
+  const auto best = std::ranges::max_element(found, {}, &Refined::score);
+  for (const Refined& rival : found) {
+    if (best->score - rival.score < options_.min_score_lead * best->score &&
+        are_apart(best->pair.second_from_first, rival.pair.second_from_first)) {
+      reason = "two motions are possible";
+      return std::nullopt;
+    }
+  }
+  if (static_cast<int>(best->pair.points.size()) < options_.two_view.min_points) {
+    reason = "too few points after refinement";
+    return std::nullopt;
+  }
+  return std::move(best->pair);
 }
 
 /// Fills `matches_`; keypoints are looked for around the place where they were last found.
@@ -81,47 +109,45 @@ int MonoInitializer::match(const FeatureFrame& frame) {
   return static_cast<int>(matches_.size());
 }
 
-std::optional<InitialPair> MonoInitializer::refined(const FeatureFrame& frame, const TwoViewResult& views,
-                                                    std::string& reason) {
+/// The motion and its points by bundle adjustment of both views, without what does not fit then.
+MonoInitializer::Refined MonoInitializer::refined(const FeatureFrame& frame, const TwoViewMotion& motion) {
   BundleProblem problem;
-  problem.camera_from_world = {SE3{}, views.b_from_a};
+  problem.camera_from_world = {SE3{}, motion.b_from_a};
   problem.pose_is_fixed = {1, 0};
-  InitialPair pair{.first = first_, .second_from_first = {}, .points = {}};
+  std::vector<InitialPair::Point> points;
   for (size_t i = 0; i < matches_.size(); ++i) {
-    if (!views.good[i]) continue;
+    if (!motion.good[i]) continue;
     const auto& [a, b] = matches_[i];
-    const int point = static_cast<int>(pair.points.size());
-    pair.points.push_back({a, b, views.points[i]});
-    problem.points_in_world.push_back(views.points[i]);
+    const int point = static_cast<int>(points.size());
+    points.push_back({a, b, motion.points[i]});
+    problem.points_in_world.push_back(motion.points[i]);
     problem.observations.push_back({0, point, first_->observations[static_cast<size_t>(a)]});
     problem.observations.push_back({1, point, frame.observations[static_cast<size_t>(b)]});
   }
   adjuster_.solve({.max_iterations = 20}, camera_, 0, problem);
 
-  std::vector<InitialPair::Point> kept;
+  Refined result;
+  result.pair.first = first_;
   std::vector<double> depths;
-  for (size_t i = 0; i < pair.points.size(); ++i) {
+  for (size_t i = 0; i < points.size(); ++i) {
     constexpr double kMaxChi2 = 5.991;
-    bool fits = true;
-    for (size_t view = 0; view < 2; ++view) {
-      fits = fits && reprojection_chi2(camera_, 0, problem.camera_from_world[view], problem.points_in_world[i],
-                                       problem.observations[2 * i + view].pixel) <= kMaxChi2;
-    }
-    if (!fits) continue;
-    kept.push_back(pair.points[i]);
-    kept.back().in_first = problem.points_in_world[i];
-    depths.push_back(kept.back().in_first.z());
+    const auto chi2 = [&](size_t view) {
+      return reprojection_chi2(camera_, 0, problem.camera_from_world[view], problem.points_in_world[i],
+                               problem.observations[2 * i + view].pixel);
+    };
+    const double in_first = chi2(0), in_second = chi2(1);
+    if (in_first > kMaxChi2 || in_second > kMaxChi2) continue;
+    result.score += 2 * kMaxChi2 - in_first - in_second;
+    result.pair.points.push_back(points[i]);
+    result.pair.points.back().in_first = problem.points_in_world[i];
+    depths.push_back(problem.points_in_world[i].z());
   }
-  if (static_cast<int>(kept.size()) < options_.two_view.min_points) {
-    reason = "too few points after refinement";
-    return std::nullopt;
-  }
+  if (depths.empty()) return result;
   const double unit = lower_median(depths);
-  for (InitialPair::Point& point : kept) point.in_first /= unit;
-  pair.points = std::move(kept);
-  pair.second_from_first = problem.camera_from_world[1];
-  pair.second_from_first.translation /= unit;
-  return pair;
+  for (InitialPair::Point& point : result.pair.points) point.in_first /= unit;
+  result.pair.second_from_first = problem.camera_from_world[1];
+  result.pair.second_from_first.translation /= unit;
+  return result;
 }
 
 }  // namespace photoslam

@@ -16,7 +16,8 @@ namespace photoslam {
 struct MonoInitializerOptions {
   double search_radius = 0.16;  ///< Of matches between the two views, relative to the width of the image.
   int min_matches = 100;
-  double max_gap_s = 3.0;  ///< The first view is given up when it is older than this.
+  double max_gap_s = 3.0;        ///< The first view is given up when it is older than this.
+  double min_score_lead = 0.01;  ///< By which the best of two motions must fit better, relative to its score.
   TwoViewOptions two_view;
   void visit(OptionVisitor& visitor);
 };
@@ -50,7 +51,11 @@ class MonoInitializer {
 
  private:
   int match(const FeatureFrame& frame);
-  std::optional<InitialPair> refined(const FeatureFrame& frame, const TwoViewResult& views, std::string& reason);
+  struct Refined {
+    InitialPair pair;
+    double score = 0;  ///< How far the squared errors stay below their limit, summed over both views.
+  };
+  Refined refined(const FeatureFrame& frame, const TwoViewMotion& motion);
 
   MonoInitializerOptions options_;
   PinholeCamera camera_;

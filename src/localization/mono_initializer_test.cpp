@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
 
 #include "map/testing/point_world.h"
 
@@ -57,11 +60,37 @@ TEST_F(MonoInitializerTest, WaitsWhileTheCameraOnlyTurns) {
   EXPECT_EQ(initializer.first_view(), FrameId(0)) << reason;
 }
 
-TEST_F(MonoInitializerTest, RefusesAWallThatAllowsTwoMotions) {
-  const SE3 facing_the_wall(so3_exp(Vec3(0, -0.8, 0)), Vec3::Zero());
-  EXPECT_FALSE(add(facing_the_wall, 0));
-  EXPECT_FALSE(add(SE3(so3_exp(Vec3(0.01, 0.03, 0)), Vec3(-0.25, 0.02, 0.03)) * facing_the_wall, 1));
-  EXPECT_EQ(reason, "two motions are possible");
+/// Moves from one place to another; gives the angle between the translation found and the true one [rad].
+std::optional<double> direction_error(PointWorld& world, const SE3& first_from_world, const SE3& second_from_first,
+                                      std::string& reason) {
+  MonoInitializer initializer({}, world.camera);
+  EXPECT_FALSE(initializer.add(world.observe(first_from_world, 0), reason));
+  const auto pair = initializer.add(world.observe(second_from_first * first_from_world, 1), reason);
+  if (!pair) return std::nullopt;
+  return std::acos(pair->second_from_first.translation.normalized().dot(second_from_first.translation.normalized()));
+}
+
+TEST_F(MonoInitializerTest, AWallAllowsTwoMotionsOfWhichTheWrongOneIsNeverTaken) {
+  world.pixel_noise = 0.7;
+  const Quat to_the_right = so3_exp(Vec3(0, -std::numbers::pi / 2, 0));
+  const SE3 wall_only(to_the_right, to_the_right * Vec3(-1, 0, 0));
+  const SE3 wall_and_more(so3_exp(Vec3(0, -0.8, 0)), Vec3::Zero());
+  std::set<std::string> reasons;
+  int accepted = 0;
+  for (const SE3& first : {wall_only, wall_and_more}) {
+    for (double step = 0.04; step <= 0.3; step += 0.02) {
+      const SE3 motion(so3_exp(Vec3(0.01, 0.03, 0)), step * Vec3(-1, 0.08, 0.12));
+      if (const auto error = direction_error(world, first, motion, reason)) {
+        ++accepted;
+        // The wrong motion goes along the normal of the wall.
+        EXPECT_LT(*error, std::numbers::pi / 4) << "after " << step << " m";
+      } else {
+        reasons.insert(reason);
+      }
+    }
+  }
+  EXPECT_GT(accepted, 8);
+  EXPECT_TRUE(reasons.contains("two motions are possible"));
 }
 
 TEST_F(MonoInitializerTest, TakesAnotherFirstViewWhenItLosesSightOfIt) {
