@@ -30,10 +30,11 @@ class SessionMergeTest : public ::testing::Test {
     settings.loaded_session = std::move(loaded);
     SystemOptions options;
     options.pipeline.iterations_per_frame = 1;
-    CornerSource source(num_frames, 240, 180, sensor);
+    CornerSource source(num_frames, 240, 180, sensor, focal);
     source.start_at = start_at;
     return run_slam(options, settings, source);
   }
+  double focal = 0.85;  // [image widths]
   std::string session(int start_at, int num_frames, SensorKind sensor = SensorKind::rgbd) {
     EXPECT_EQ(walk(start_at, num_frames, sensor).failure, "");
     return *read_session(folder);
@@ -76,6 +77,7 @@ TEST_F(SessionMergeTest, MapsThatShowDifferentPlacesStayApart) {
 }
 
 TEST_F(SessionMergeTest, SessionsOfOtherSensorsAreRefused) {
+  focal = CornerSource::kWide;
   const auto merged = merge_sessions({}, session(0, 20), session(0, 40, SensorKind::mono), executor);
   ASSERT_FALSE(merged);
   EXPECT_NE(merged.error().message.find("depth was measured in only one"), std::string::npos);

@@ -79,7 +79,7 @@ TEST(RunSlam, TracksADistortedStereoRig) {
 }
 
 TEST(RunSlam, TracksASingleCameraUpToScale) {
-  const RunOutcome outcome = run(CornerSource(60, 320, 240, SensorKind::mono), deterministic(2));
+  const RunOutcome outcome = run(CornerSource(60, 320, 240, SensorKind::mono, CornerSource::kWide), deterministic(2));
   ASSERT_EQ(outcome.frames.size(), 60u);
   std::vector<Vec3> estimate, truth;
   for (const FrameOutcome& frame : outcome.frames) {
@@ -96,9 +96,9 @@ TEST(RunSlam, TracksASingleCameraUpToScale) {
 }
 
 TEST(RunSlam, DeterministicRunsOfASingleCameraGiveTheSameBytes) {
-  const RunOutcome one = run(CornerSource(45, 320, 240, SensorKind::mono), deterministic(1));
+  const RunOutcome one = run(CornerSource(45, 320, 240, SensorKind::mono, CornerSource::kWide), deterministic(1));
   EXPECT_GE(one.final.keyframes_from_world.size(), 2u);
-  expect_same_bytes(one, run(CornerSource(45, 320, 240, SensorKind::mono), deterministic(2)));
+  expect_same_bytes(one, run(CornerSource(45, 320, 240, SensorKind::mono, CornerSource::kWide), deterministic(2)));
 }
 
 TEST(RunSlam, RealTimePaceAccountsForEveryFrame) {

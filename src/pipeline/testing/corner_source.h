@@ -16,11 +16,15 @@ namespace photoslam::testing {
 /// milliseconds. The stereo cameras have lenses and squint at each other.
 class CornerSource final : public FrameSource {
  public:
-  explicit CornerSource(int num_frames, int width = 240, int height = 180, SensorKind sensor = SensorKind::rgbd)
+  /// A lens that sees more than the wall in front, which two motions would explain to a single camera [image widths].
+  static constexpr double kWide = 0.45;
+
+  explicit CornerSource(int num_frames, int width = 240, int height = 180, SensorKind sensor = SensorKind::rgbd,
+                        double focal = 0.85)
       : num_frames_(num_frames) {
     info_.name = "painted corner";
     info_.format = "test";
-    info_.camera = {width, height, 0.85 * width, 0.85 * width, 0.51 * width, 0.49 * height};
+    info_.camera = {width, height, focal * width, focal * width, 0.51 * width, 0.49 * height};
     info_.sensor = sensor;
     if (sensor == SensorKind::rgbd) info_.metres_per_depth_unit = kMetresPerUnit;
     if (sensor == SensorKind::stereo) {
