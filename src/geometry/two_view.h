@@ -49,7 +49,7 @@ struct TwoViewResult {
   bool success = false;
   std::string reason;         ///< Why there is no success.
   bool plane_scores = false;  ///< Whether the homography explains the matches better than the essential matrix.
-  /// Different motions that explain them nearly equally well, the one with most points first.
+  /// Those worth a closer look (min_support), most points first; some may be estimates of the same motion.
   std::vector<TwoViewMotion> motions;
 };
 

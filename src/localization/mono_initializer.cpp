@@ -136,7 +136,7 @@ MonoInitializer::Refined MonoInitializer::refined(const FeatureFrame& frame, con
                                problem.observations[2 * i + view].pixel);
     };
     const double in_first = chi2(0), in_second = chi2(1);
-    if (in_first > kMaxChi2 || in_second > kMaxChi2) continue;
+    if (!(in_first <= kMaxChi2 && in_second <= kMaxChi2)) continue;
     result.score += 2 * kMaxChi2 - in_first - in_second;
     result.pair.points.push_back(points[i]);
     result.pair.points.back().in_first = problem.points_in_world[i];

@@ -54,7 +54,7 @@ void FrameFeed::wait_until(SteadyTime due) {
 }
 
 void FrameFeed::read_all() {
-  // Frames are decoded well ahead of their time, so this never needs the core that tracks.
+  // Tracking comes first: files are read well ahead of their time, and a camera waits in its driver's buffers.
   lower_thread_priority(ThreadPriority::supporting);
   try {
     while (!stop_.stop_requested()) {
