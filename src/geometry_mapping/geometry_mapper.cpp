@@ -66,6 +66,10 @@ GeometryUpdate GeometryMapper::process(const KeyframeProposal& proposal, const s
 
 std::shared_ptr<const MapSnapshot> GeometryMapper::correct(const MapCorrection& correction) {
   map_.apply(correction);
+  for (const auto& [landmark, keyframe] : correction.wrong_observations) {
+    map_.remove_observation(landmark, keyframe);
+    map_.update_view(landmark);
+  }
   for (const auto& [from, to] : correction.duplicates) {
     if (map_.landmark(from).view.alive && map_.landmark(to).view.alive) map_.fuse(from, to);
   }

@@ -47,8 +47,7 @@ std::optional<Relocalization> Relocalizer::relocalize(const MapSnapshot& map, co
   std::vector<KeyframeId> candidates;
   const auto propose = [&](KeyframeId id) {
     if (!map.has(id)) return;
-    const Keyframe& keyframe = map.keyframe(id).keyframe;
-    if (keyframe.culled) id = keyframe.parent;  // what it saw is seen from there
+    id = map.living(id);  // what a culled one saw is seen from there
     if (std::ranges::find(candidates, id) == candidates.end()) candidates.push_back(id);
   };
   propose(likely);

@@ -60,6 +60,45 @@ std::vector<double> depth_ratios(const BundleProblem& before, const BundleProble
   return result;
 }
 
+/// Fusing takes a few landmarks for one another. They pull the harder the farther they are off, and the ends of a loop
+/// give way: what does not fit is left out, in rounds, as what is right comes to fit better and better.
+class RobustAdjustment {
+ public:
+  RobustAdjustment(const BundleOptions& options, const PinholeCamera& camera, double bf)
+      : options_(options), camera_(camera), bf_(bf) {}
+
+  /// The observations of the problem stay as they are.
+  void solve(BundleProblem& problem, const std::function<bool()>& interrupted) {
+    struct Round {
+      int iterations;
+      double gate;  // in thresholds of the robust loss
+    };
+    const std::vector<BundleProblem::Observation> all = problem.observations;
+    for (const auto& [iterations, gate] : {Round{5, 4.0}, Round{5, 2.0}, Round{10, 1.0}}) {
+      BundleOptions some = options_;
+      some.max_iterations = std::min(iterations, options_.max_iterations);
+      const bool stopped = adjuster_.solve(some, camera_, bf_, problem, interrupted).interrupted;
+      problem.observations = all;
+      if (stopped) return;
+      std::erase_if(problem.observations, [&](const auto& o) { return !fits(problem, o, gate); });
+    }
+    adjuster_.solve(options_, camera_, bf_, problem, interrupted);
+    problem.observations = all;
+  }
+
+  bool fits(const BundleProblem& problem, const BundleProblem::Observation& o, double gate) const {
+    const double threshold = gate * (o.pixel.has_depth() ? options_.huber_depth_px : options_.huber_mono_px);
+    return reprojection_chi2(camera_, bf_, problem.camera_from_world[static_cast<size_t>(o.pose)],
+                             problem.points_in_world[static_cast<size_t>(o.point)], o.pixel) < threshold * threshold;
+  }
+
+ private:
+  BundleOptions options_;
+  PinholeCamera camera_;
+  double bf_;
+  BundleAdjuster adjuster_;
+};
+
 }  // namespace
 
 MapCorrection adjust_everything(const BundleOptions& options, const PinholeCamera& camera, double bf,
@@ -67,9 +106,15 @@ MapCorrection adjust_everything(const BundleOptions& options, const PinholeCamer
   const bool depth_is_measured = bf > 0;
   Problem problem(map, depth_is_measured);
   const BundleProblem before = problem.bundle;
-  BundleAdjuster().solve(options, camera, bf, problem.bundle, interrupted);
+  RobustAdjustment adjustment(options, camera, bf);
+  adjustment.solve(problem.bundle, interrupted);
 
   MapCorrection correction;
+  for (const auto& o : problem.bundle.observations) {
+    if (adjustment.fits(problem.bundle, o, 1.0)) continue;
+    correction.wrong_observations.emplace_back(problem.landmark_of_point[static_cast<size_t>(o.point)],
+                                               KeyframeId(o.pose));
+  }
   std::vector<double> scale(before.camera_from_world.size(), 1.0);
   if (!depth_is_measured) scale = depth_ratios(before, problem.bundle);
   for (size_t i = 0; i < before.camera_from_world.size(); ++i) {

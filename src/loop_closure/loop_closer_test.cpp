@@ -4,7 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "geometry_mapping/geometry_mapper.h"
+#include "loop_closure/full_adjustment.h"
 #include "map/testing/corridor_world.h"
 #include "math/umeyama.h"
 
@@ -107,6 +110,57 @@ TEST(LoopCloser, RecognizesTheLandmarksOfAPlaceThatIsMet) {
   EXPECT_TRUE(sees_the_start());
   EXPECT_EQ(closing.closer.num_closed(), 0);
   EXPECT_LT(closing.gap(), 0.02);
+}
+
+TEST(FullAdjustment, LandmarksTakenForOneAnotherLeaveTheMap) {
+  for (const bool with_depth : {true, false}) {
+    Closing closing(CorridorWorld::square(10, 3), with_depth, 0, 3);
+    Map map = closing.corridor.drifted_map(0.0005, 0, 0, with_depth, 3);
+    // In the first and last keyframes, as when a loop is fused.
+    const auto last = KeyframeId(static_cast<int32_t>(map.num_keyframes()) - 1);
+    std::vector<LandmarkId> old_place, new_place;
+    for (int32_t k = 0; k < 5; ++k) {
+      for (const LandmarkId id : map.keyframe(KeyframeId(5 + k)).landmarks) old_place.push_back(id);
+      for (const LandmarkId id : map.keyframe(KeyframeId(last.value - k)).landmarks) new_place.push_back(id);
+    }
+    Random random(5);
+    std::set<LandmarkId> wrong;
+    while (wrong.size() < 40) {
+      const LandmarkId a = old_place[static_cast<size_t>(random.index(static_cast<int>(old_place.size())))];
+      const LandmarkId b = new_place[static_cast<size_t>(random.index(static_cast<int>(new_place.size())))];
+      if (!a.valid() || !b.valid() || a == b || !map.landmark(a).view.alive || !map.landmark(b).view.alive) continue;
+      map.fuse(b, a);
+      wrong.insert(a);
+    }
+    closing.geometry.set_map(std::move(map));
+    const BundleOptions options{.max_iterations = 50, .relative_cost_tolerance = 1e-6};
+    closing.geometry.correct(
+        adjust_everything(options, closing.corridor.world.camera, closing.bf, *closing.geometry.snapshot()));
+    EXPECT_LT(closing.ate(), 0.001 * closing.corridor.path_length());
+    for (const LandmarkId id : wrong) {
+      const auto& observations = closing.geometry.map().landmark(id).observations;
+      const auto is_old = [&](const LandmarkObservation& o) { return o.keyframe.value < 40; };
+      const auto old = std::ranges::count_if(observations, is_old);
+      EXPECT_TRUE(old == 0 || old == std::ssize(observations)) << id.value;
+    }
+  }
+}
+
+TEST(LoopDetector, FindsTheParentsOfCulledKeyframes) {
+  CorridorWorld corridor = CorridorWorld::square(10, 3);
+  Map map = corridor.drifted_map(0.004, 0.002, 0, true, 3);
+  LoopDetectorOptions options;
+  options.max_candidates = 1;
+  LoopDetector detector(options, orb(), corridor.world.camera, corridor.world.bf, false);
+  const auto now = KeyframeId(static_cast<int32_t>(corridor.truth.size()) - 1);
+  const auto place = map.snapshot();
+  for (KeyframeId id(0); id < now; ++id.value) detector.add(*place, id);
+
+  // The lap is 133.3 steps long: those are the keyframes of the first that are nearest.
+  for (const int culled : {12, 13, 11}) map.cull_keyframe(KeyframeId(culled));
+  const auto loop = detector.detect(*map.snapshot(), now);
+  ASSERT_TRUE(loop.has_value());
+  EXPECT_EQ(loop->then, KeyframeId(10));
 }
 
 /// Cuts a map in two: what keyframes from `first` on see becomes a map of its own, somewhere else in the world.

@@ -126,8 +126,8 @@ LoopDetector::LoopDetector(const LoopDetectorOptions& options, const OrbOptions&
 
 std::optional<Loop> LoopDetector::detect(const MapSnapshot& map, KeyframeId now) {
   std::optional<Loop> met;
-  for (const PlaceCandidate& candidate : similar_places(map, map.keyframe(now).keyframe)) {
-    auto loop = verify(map, KeyframeId(candidate.place), now);
+  for (const KeyframeId then : similar_places(map, map.keyframe(now).keyframe)) {
+    auto loop = verify(map, then, now);
     if (!loop) continue;
     loop->is_met = is_met(map, *loop);
     if (!loop->is_met && confirm(map, *loop)) return loop;
@@ -140,17 +140,23 @@ void LoopDetector::add(const MapSnapshot& map, KeyframeId id) {
   index_.add(id.value, strongest_descriptors(map.keyframe(id).keyframe.frame->features));
 }
 
-std::vector<PlaceCandidate> LoopDetector::similar_places(const MapSnapshot& map, const Keyframe& now) {
+/// What a culled keyframe saw is seen from its parent.
+std::vector<KeyframeId> LoopDetector::similar_places(const MapSnapshot& map, const Keyframe& now) {
   const std::vector<Descriptor> descriptors = strongest_descriptors(now.frame->features);
   const std::set<KeyframeId> known = connected(map, now.id);
   const auto accept = [&](int place) {
-    const KeyframeId then(place);
-    const bool is_long_ago = now.id.value - place >= options_.min_keyframe_gap;
+    const KeyframeId then = map.living(KeyframeId(place));
+    const bool is_long_ago = now.id.value - then.value >= options_.min_keyframe_gap;
     return !known.contains(then) && (is_long_ago || map.root_of(then) != map.root_of(now.id));
   };
-  auto candidates = index_.query(descriptors, options_.max_candidates, accept);
+  const auto num_candidates = static_cast<size_t>(options_.max_candidates);
+  std::vector<KeyframeId> places;
+  for (const PlaceCandidate& candidate : index_.query(descriptors, index_.num_places(), accept)) {
+    const KeyframeId then = map.living(KeyframeId(candidate.place));
+    if (places.size() < num_candidates && std::ranges::find(places, then) == places.end()) places.push_back(then);
+  }
   index_.add(now.id.value, descriptors);
-  return candidates;
+  return places;
 }
 
 /// Where a keypoint's landmark is, or what its depth says.

@@ -55,7 +55,7 @@ class LoopDetector {
   void add(const MapSnapshot& map, KeyframeId id);
 
  private:
-  std::vector<PlaceCandidate> similar_places(const MapSnapshot& map, const Keyframe& now);
+  std::vector<KeyframeId> similar_places(const MapSnapshot& map, const Keyframe& now);
   std::optional<Loop> verify(const MapSnapshot& map, KeyframeId then, KeyframeId now);
   std::vector<PointMatch> match_features(const MapSnapshot& map, const Keyframe& then, const Keyframe& now) const;
   /// What a keyframe at a given pose finds of the landmarks it should see.

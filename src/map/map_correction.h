@@ -23,6 +23,8 @@ struct MapCorrection {
   std::vector<std::pair<KeyframeId, KeyframeId>> new_parents = {};
   /// Landmarks that are the same point: the first is to become the second.
   std::vector<std::pair<LandmarkId, LandmarkId>> duplicates = {};
+  /// Landmarks that these keyframes do not see after all.
+  std::vector<std::pair<LandmarkId, KeyframeId>> wrong_observations = {};
   /// Where more duplicates are to be sought: these landmarks in these keyframes.
   std::vector<LandmarkId> loop_landmarks = {};
   std::vector<KeyframeId> loop_keyframes = {};

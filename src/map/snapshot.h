@@ -40,6 +40,8 @@ class MapSnapshot {
   bool has(KeyframeId id) const { return id.valid() && static_cast<size_t>(id.value) < keyframes.size(); }
   const KeyframeView& keyframe(KeyframeId id) const { return *keyframes[static_cast<size_t>(id.value)]; }
 
+  /// The keyframe, or the parent that it follows since it was culled.
+  KeyframeId living(KeyframeId id) const { return keyframe(id).keyframe.culled ? keyframe(id).keyframe.parent : id; }
   /// The root of the spanning tree that a keyframe is in: each map of its own has one.
   KeyframeId root_of(KeyframeId id) const;
 
