@@ -112,6 +112,17 @@ TEST_F(SessionTest, GoesOnMappingWhereTheOtherEnded) {
   EXPECT_GT(read_session(folder / "longer")->size(), bytes->size());
 }
 
+TEST_F(SessionTest, IsThereBeforeTrainingBegins) {
+  RunSettings at_once = continuing("");
+  at_once.deterministic = false;
+  at_once.pace = Pace::asap;
+  for (int i = 0; i < 10; ++i) {
+    const RunOutcome outcome = run(3, at_once, 20);
+    EXPECT_EQ(outcome.failure, "");
+    EXPECT_GE(outcome.final.keyframes_from_world.size(), first->final.keyframes_from_world.size());
+  }
+}
+
 TEST_F(SessionTest, AutosavesAreWholeSessions) {
   RunSettings often = settings("often");
   often.autosave_s = 1e-3;

@@ -57,13 +57,12 @@ class Session {
         geometry_(options.geometry_mapping, options.features, localization_.camera(), localization_.bf()),
         loop_closer_(options.loop_closure, options.features, localization_.camera(), localization_.bf()),
         mapping_(options, settings, localization_.sensor(), executor_),
+        resumed_(settings_.loaded_session && load_session()),
         mapping_stage_(kStageQueue, threaded_, mapping_work(), failures_),
         geometry_stage_(kStageQueue, threaded_, geometry_work(), failures_),
         loop_stage_(kStageQueue, threaded_, loop_work(), failures_),
         feed_(source, logical_time_ ? Pace::asap : settings.pace, static_cast<size_t>(options.pipeline.input_queue),
-              threaded_, stop_.get_token(), failures_) {
-    if (settings_.loaded_session) load_session();
-  }
+              threaded_, stop_.get_token(), failures_) {}
 
   RunOutcome run(const std::function<void(const Progress&)>& on_progress);
 
@@ -78,7 +77,7 @@ class Session {
   void take_correction();
   void look_for_loops();
   void close_remaining_loops();
-  void load_session();
+  bool load_session();
   std::shared_ptr<Archive> begin_session();
   void save_session();
   void deliver(MapUpdate update);
@@ -123,19 +122,20 @@ class Session {
 
   RunOutcome outcome_;
 
+  bool resumed_;  // from a session, before any stage or the feed begins to work
   Stage<MappingMessage> mapping_stage_;
   Stage<GeometryMessage> geometry_stage_;
   Stage<LoopMessage> loop_stage_;
   FrameFeed feed_;
 };
 
-void Session::load_session() {
+bool Session::load_session() {
   Archive reader(*settings_.loaded_session);
   SessionHeader header;
   reader(header);
   if ((header.bf > 0) != (localization_.bf() > 0)) {
     failures_.report("session", "made with another kind of sensor: depth was measured in only one of both");
-    return;
+    return false;
   }
   reader(geometry_, mapping_.mapper());
   newest_map_ = geometry_.snapshot();
@@ -145,6 +145,7 @@ void Session::load_session() {
       std::ranges::count_if(newest_map_->keyframes, [](const auto& view) { return !view->keyframe.parent.valid(); });
   localization_.resume(static_cast<int>(newest_map_->keyframes.size()), static_cast<int>(num_maps));
   mapping_.gaussians = mapping_.mapper().gaussians().size();
+  return true;
 }
 
 /// Header and geometric map; the photorealistic map follows.
