@@ -27,8 +27,8 @@ double peak_rss_mb();
 double current_rss_mb();
 /// How far a thread steps back behind those that track: its nice value.
 enum class ThreadPriority {
-  supporting = 4,   ///< Tracking needs the result soon: reading frames, geometry mapping.
-  background = 10,  ///< Whatever time is left.
+  supporting = 10,  ///< Tracking needs the result soon: reading frames, geometry mapping.
+  background = 19,  ///< Whatever time is left.
 };
 /// Lowers the calling thread's scheduling priority for good; without effect where not supported.
 void lower_thread_priority(ThreadPriority priority);
