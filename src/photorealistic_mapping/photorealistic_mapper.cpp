@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/check.h"
 #include "image/convert.h"
 #include "math/median.h"
+#include "photorealistic_mapping/handover.h"
 #include "photorealistic_mapping/seams.h"
 #include "photorealistic_mapping/view_geometry.h"
 #include "photorealistic_mapping/view_redundancy.h"
@@ -66,6 +68,9 @@ void PhotorealisticOptions::visit(OptionVisitor& v) {
   v.group("schedule", "Which keyframe is trained, at which resolution.", schedule);
   v.group("rates", "Step sizes of Adam.", rates);
   v.group("densification", "Split, clone and prune.", densification);
+  v.value({"handover", "", 0, 0,
+           "Gaussians that a loop would tear from the picture of the keyframe that showed them last go with it."},
+          handover);
   v.group("doubling", "What a loop brings together.", doubling);
   v.group("poses", "Photometric refinement of keyframe poses.", poses);
   v.group("exposure", "Brightness of each keyframe's picture.", exposure);
@@ -86,20 +91,38 @@ void PhotorealisticMapper::update_poses(const MapSnapshot& map) {
   std::vector<double> depths;
   std::vector<Sim3> before, after;
   for (size_t i = 0; i < anchors_from_world_.size(); ++i) {
+    const KeyframeView& view = map.keyframe(KeyframeId(static_cast<int32_t>(i)));
     before.push_back(anchor_from_world(anchors_from_world_[i], anchor_scales_[i]));
-    const KeyframeView& keyframe = map.keyframe(KeyframeId(static_cast<int32_t>(i)));
-    anchors_from_world_[i] = keyframe.keyframe.camera_from_world;
-    if (keyframe.keyframe.scale != anchor_scales_[i]) {
-      rescale(i, keyframe.keyframe.scale / anchor_scales_[i]);
-      anchor_scales_[i] = keyframe.keyframe.scale;
-    }
-    after.push_back(anchor_from_world(anchors_from_world_[i], anchor_scales_[i]));
-    if (keyframe.median_depth > 0) depths.push_back(keyframe.median_depth);
+    after.push_back(anchor_from_world(view.keyframe.camera_from_world, view.keyframe.scale));
+    if (view.median_depth > 0) depths.push_back(view.median_depth);
   }
   if (!depths.empty()) scene_depth_ = lower_median(depths);
   const std::vector<int> seams = find_seams(options_.schedule.seam_px, sensor_.camera, map, before);
+  const bool corrected = map.num_corrections != std::exchange(num_corrections_, map.num_corrections);
+  if (options_.handover && corrected && !seams.empty()) hand_over_at(seams, before, after);
+  for (size_t i = 0; i < anchors_from_world_.size(); ++i) {
+    const Keyframe& keyframe = map.keyframe(KeyframeId(static_cast<int32_t>(i))).keyframe;
+    anchors_from_world_[i] = keyframe.camera_from_world;
+    if (keyframe.scale == anchor_scales_[i]) continue;
+    rescale(i, keyframe.scale / anchor_scales_[i]);
+    anchor_scales_[i] = keyframe.scale;
+  }
   merge_doubled(options_.doubling, before, after, seams, model_);
   schedule_.revisit(seams);
+}
+
+/// Before a correction: what keyframes at the seams show goes with them.
+void PhotorealisticMapper::hand_over_at(std::span<const int> seams, std::span<const Sim3> before,
+                                        std::span<const Sim3> after) {
+  SerialExecutor serial;
+  LastViewers viewers(model_);
+  for (const int seam : seams) {
+    const auto view = static_cast<size_t>(seam);
+    if (view >= views_.size() || !views_[view].has_images()) continue;
+    render_picture(view, serial);
+    viewers.show(seam, views_[view].picture.camera, camera_from_anchor_, render_);
+  }
+  hand_over(options_.schedule.seam_px, sensor_.camera, before, after, viewers, model_);
 }
 
 void PhotorealisticMapper::rescale(size_t index, double factor) {

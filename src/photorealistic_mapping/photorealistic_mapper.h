@@ -45,6 +45,7 @@ struct PhotorealisticOptions {
   int reseed_interval = 25;
   double reseed_color_error = 0.03;
   double image_budget_mb = 1000;
+  bool handover = true;
   SeedingOptions seeding;
   KeyframeDepthOptions depth;
   FeatureDepthOptions feature_depth;
@@ -143,6 +144,7 @@ class PhotorealisticMapper {
   void set_images(const ImageU8& color, const ImageU16& depth, TrainingView& view) const;
   void keep_image_budget();
   void serialize_view(Archive& archive, TrainingView* view);
+  void hand_over_at(std::span<const int> seams, std::span<const Sim3> before, std::span<const Sim3> after);
   void rescale(size_t view, double factor);
   void seed_keyframe(const MapSnapshot& map, size_t view, Executor& executor);
   void sweep_picture(const MapSnapshot& map, size_t view, Executor& executor);
@@ -162,6 +164,7 @@ class PhotorealisticMapper {
   std::vector<SE3> anchors_from_world_;
   std::vector<double> anchor_scales_;  // Keyframe::scale as taken over last
   std::vector<TrainingView> views_;
+  int num_corrections_ = 0;   // of the map, as taken over last
   double scene_depth_ = 1.0;  // median over keyframes of their median depth [m]
   int iteration_ = 0;
   double training_psnr_ = 0;
