@@ -38,6 +38,9 @@ void GeometryMapperOptions::visit(OptionVisitor& v) {
   v.value({"max_landmark_depth_baselines", "", 1.0, 1000.0,
            "Depth, in baselines of the stereo or depth camera, up to which one view makes a landmark."},
           max_landmark_depth_baselines);
+  v.value(
+      {"min_landmarks", "", 0, 10000, "The nearest make landmarks beyond that depth, too, until a keyframe has these."},
+      min_landmarks);
   v.group("keyframe_culling", "When a keyframe becomes a mere anchor.", keyframe_culling);
   v.group("bundle", "The local bundle adjustment.", bundle);
 }
@@ -139,9 +142,28 @@ int GeometryMapper::cull_recent_landmarks(KeyframeId current) {
   return culled;
 }
 
+/// Up to which depth the keyframe's measurements make landmarks. Where everything is far away, the nearest must do
+/// until there is parallax to triangulate with.
+double GeometryMapper::max_landmark_depth(const Keyframe& keyframe) const {
+  const double near = options_.max_landmark_depth_baselines * bf_ / camera_.fx;
+  int missing = options_.min_landmarks;
+  std::vector<double> depths;
+  for (size_t i = 0; i < keyframe.frame->size(); ++i) {
+    const auto depth = static_cast<double>(keyframe.frame->depth[i]);
+    if (keyframe.landmarks[i].valid()) {
+      --missing;
+    } else if (depth > 0) {
+      depths.push_back(depth);
+    }
+  }
+  if (missing <= 0 || depths.empty()) return near;
+  std::ranges::sort(depths);
+  return std::max(near, depths[std::min(static_cast<size_t>(missing), depths.size()) - 1]);
+}
+
 int GeometryMapper::create_measured_landmarks(KeyframeId id) {
   const Keyframe& keyframe = map_.keyframe(id);
-  const double max_depth = options_.max_landmark_depth_baselines * bf_ / camera_.fx;
+  const double max_depth = max_landmark_depth(keyframe);
   int created = 0;
   for (size_t i = 0; i < keyframe.frame->size(); ++i) {
     const auto depth = static_cast<double>(keyframe.frame->depth[i]);

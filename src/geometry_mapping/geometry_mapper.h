@@ -25,6 +25,7 @@ struct GeometryMapperOptions {
   double fusion_radius_px = 3.0;
   double min_found_ratio = 0.25;
   double max_landmark_depth_baselines = 30.0;
+  int min_landmarks = 100;
   KeyframeCullingOptions keyframe_culling;
   BundleOptions bundle;
   void visit(OptionVisitor& visitor);
@@ -65,6 +66,7 @@ class GeometryMapper {
   void insert(const KeyframeProposal& proposal);
   int cull_recent_landmarks(KeyframeId current);
   LandmarkId living(LandmarkId id) const;
+  double max_landmark_depth(const Keyframe& keyframe) const;
   int create_measured_landmarks(KeyframeId id);
   int triangulate_landmarks(KeyframeId id);
   int triangulate_with(KeyframeId id, KeyframeId other);

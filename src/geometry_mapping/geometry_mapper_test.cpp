@@ -107,6 +107,15 @@ TEST_F(WalkTest, ExactFeaturesGiveAnExactMap) {
   EXPECT_GT(alive, 500u);
 }
 
+TEST_F(WalkTest, ASceneThatBeginsBeyondTheRangeOfTheRigIsTracked) {
+  PointWorld world;
+  world.bf = 20;  // 30 baselines are 1.1 m: only walls that are farther away
+  walk(world, 60);
+  EXPECT_EQ(frames.size(), 60u);
+  EXPECT_GE(updates.front().new_landmarks, GeometryMapperOptions{}.min_landmarks);
+  EXPECT_LT(final_rmse(), 1e-4);
+}
+
 TEST_F(WalkTest, NoisyFeaturesGiveTheAccuracyThatTheirNumberAllows) {
   PointWorld world;
   world.pixel_noise = 0.7;
