@@ -60,6 +60,14 @@ class CommandLineTest(unittest.TestCase):
         shutil.copytree(SEQUENCE, copy)
         return copy
 
+    def drifting_sequence(self):
+        """A short walk under an exposure that changes."""
+        sequence = self.folder / "drifting"
+        result = photoslam("synth", "room", "--frames", "16", "--shrink", "4", "--exposure-drift", "1",
+                           "--exposure-jumps", "0.5", "--fps", "6", "--output", sequence)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return sequence
+
     def run_deterministic(self, name, *options, sequence=SEQUENCE):
         output = self.folder / name
         result = photoslam("run", sequence, "--output", output, "--deterministic", *options)
@@ -294,7 +302,7 @@ class RunTest(CommandLineTest):
         self.assertEqual(len(report["config"]["changed"]), 0)
         self.assertIsNone(report["image"]["lpips"])
         self.assertIsNone(report["latency"]["p50_ms"])  # no due times without real-time pace
-        for name in ("trajectory.tum", "trajectory_online.tum", "keyframes.tum", "frames.csv", "map.ply",
+        for name in ("trajectory.tum", "trajectory_online.tum", "keyframes.tum", "frames.csv", "exposures.txt", "map.ply",
                      "report.html"):
             self.assertTrue((output / name).is_file(), name)
         self.assertEqual([path.name for path in output.iterdir() if "tmp" in path.name], [])
@@ -316,6 +324,51 @@ class RunTest(CommandLineTest):
         self.assertEqual(result.returncode, 0, result.stderr)
         after = json.loads((output / "report.json").read_text(encoding="utf-8"))
         self.assertAlmostEqual(before["ate"]["rmse_m"], after["ate"]["rmse_m"], places=9)
+
+    def test_eval_scores_with_the_exposures_of_the_run(self):
+        output = self.run_deterministic("run", "--iterations-per-frame", "4", sequence=self.drifting_sequence())
+        report = json.loads((output / "report.json").read_text(encoding="utf-8"))["image"]
+        exposures = output / "exposures.txt"
+        gains = [line.split()[1:4] for line in exposures.read_text(encoding="utf-8").splitlines() if line[0] != "#"]
+        self.assertGreater(max(abs(float(gain) - 1) for line in gains for gain in line), 0.05)
+
+        def psnr():
+            result = photoslam("eval", output, "--json")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            return json.loads(result.stdout)["image"]["psnr_db"]
+
+        self.assertAlmostEqual(psnr(), report["psnr_db"], places=2)
+        exposures.rename(self.folder / "moved")  # as a run of an older version
+        self.assertLess(psnr(), report["psnr_db"] - 0.2)
+        exposures.write_text("# photoslam exposures 2\n", encoding="utf-8")
+        self.assert_fails(photoslam("eval", output), 1, f"{exposures}:1")
+        self.assert_fails(photoslam("train", "--poses", output, "--iterations", "1"), 1, f"{exposures}:1")
+
+    def test_eval_at_the_true_poses(self):
+        output = self.run_deterministic("run")
+        report = json.loads((output / "report.json").read_text(encoding="utf-8"))
+        result = photoslam("eval", output, "--poses", "truth", "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        # Tracking of so short a walk is nearly exact: other poses change little, but something.
+        difference = json.loads(result.stdout)["image"]["psnr_db"] - report["image"]["psnr_db"]
+        self.assertNotEqual(difference, 0)
+        self.assertLess(abs(difference), 1)
+        description = json.loads((output / "run.json").read_text(encoding="utf-8"))
+        blind = self.copy_of_sequence()
+        (blind / "groundtruth.txt").unlink()
+        description["dataset"] = str(blind)
+        (output / "run.json").write_text(json.dumps(description), encoding="utf-8")
+        self.assert_fails(photoslam("eval", output, "--poses", "truth"), 1, "--truth")
+
+    def test_training_from_random_gaussians_has_no_other_seeds(self):
+        output = self.run_deterministic("run", "--iterations-per-frame", "1")
+        trained = self.folder / "trained"
+        result = photoslam("train", "--poses", output, "--init", "random:100", "--iterations", "1", "--output", trained)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        header = (trained / "map.ply").read_bytes()[:200].decode("ascii", "replace")
+        count = int(re.search(r"element vertex (\d+)", header)[1])
+        self.assertGreater(count, 0)
+        self.assertLessEqual(count, 100)
 
     def test_exports_for_other_programs(self):
         run = self.run_deterministic("run")

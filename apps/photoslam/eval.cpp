@@ -22,6 +22,7 @@ struct EvalArguments {
   fs::path folder;
   fs::path truth;
   std::string frames = "all";
+  std::string poses = "estimate";
   bool json = false;
 };
 
@@ -32,12 +33,34 @@ bool is_chosen(const FrameRecord& frame, const std::string& which, int hold_out)
   return true;
 }
 
+/// The true poses of the estimate's frames in the estimate's world. Positions alone hardly tell how a short walk is
+/// turned, and renders are sensitive to that: the worlds are aligned by mean rotation and mean position.
+Result<Trajectory> true_poses(const Trajectory& estimate, const std::optional<Trajectory>& truth, bool with_scale) {
+  const auto alignment = truth ? absolute_error(estimate, *truth, with_scale) : std::nullopt;
+  if (!alignment) return error("--poses truth needs a true trajectory of the sequence: --truth");
+  Trajectory poses;
+  Vec3 own_centre = Vec3::Zero(), true_centre = Vec3::Zero();
+  Eigen::Vector4d rotation_sum = Eigen::Vector4d::Zero();
+  const auto pairs = associate(estimate, *truth);
+  for (const auto& [own, theirs] : pairs) {
+    const SE3 &own_pose = estimate[own].world_from_camera, &true_pose = (*truth)[theirs].world_from_camera;
+    poses.push_back({estimate[own].timestamp_ns, true_pose});
+    own_centre += own_pose.translation / static_cast<double>(pairs.size());
+    true_centre += true_pose.translation / static_cast<double>(pairs.size());
+    const Eigen::Vector4d rotation = (own_pose.rotation * true_pose.rotation.conjugate()).coeffs();
+    rotation_sum += rotation.dot(rotation_sum) < 0 ? Eigen::Vector4d(-rotation) : rotation;
+  }
+  Sim3 estimate_from_truth(1 / alignment->scale, Quat(rotation_sum).normalized(), Vec3::Zero());
+  estimate_from_truth.translation = own_centre - estimate_from_truth * true_centre;
+  return aligned(poses, estimate_from_truth);
+}
+
 Result<std::vector<FrameScore>> score_run(const EvalArguments& arguments, const RunDescription& description,
-                                          const FrameLog& log, const Trajectory& trajectory) {
-  auto source = open_source(description.dataset, description.source);
-  if (!source) return source.error();
+                                          FrameSource& source, const FrameLog& log, const Trajectory& trajectory) {
   const auto table = read_gaussian_ply(arguments.folder / "map.ply");
   if (!table) return table.error();
+  const auto exposures = read_run_exposures(arguments.folder);
+  if (!exposures) return exposures.error();
   const splatting::GaussianModel model = from_world(*table);
   const std::vector<SE3> world = {SE3{}};
 
@@ -48,11 +71,15 @@ Result<std::vector<FrameScore>> score_run(const EvalArguments& arguments, const 
     const auto pose = pose_at.find(frame.timestamp_ns);
     if (pose == pose_at.end() || !is_chosen(frame, arguments.frames, description.hold_out)) continue;
     const auto id = static_cast<size_t>(frame.frame.value);
-    if (task.camera_from_world.size() <= id) task.camera_from_world.resize(id + 1);
+    if (task.camera_from_world.size() <= id) {
+      task.camera_from_world.resize(id + 1);
+      task.exposures.resize(id + 1);
+    }
     task.camera_from_world[id] = pose->second;
+    task.exposures[id] = nearest_exposure(*exposures, frame.timestamp_ns);
   }
   ThreadPool executor(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
-  return score_maps(**source, std::span(&task, 1), {}, executor).front().scores;
+  return score_maps(source, std::span(&task, 1), {}, executor).front().scores;
 }
 
 Status eval(const EvalArguments& arguments) {
@@ -67,19 +94,27 @@ Status eval(const EvalArguments& arguments) {
   const auto log = read_frame_log(arguments.folder / "frames.csv");
   if (!log) return log.error();
 
+  auto source = open_source(description->dataset, description->source);
+  if (!source) return source.error();
+  const bool with_scale = (*source)->info().sensor == SensorKind::mono;
+
   HtmlReport html;
   html.report = std::move(*report);
+  std::optional<Trajectory> truth;
   const auto found = arguments.truth.empty() ? find_ground_truth(description->dataset) : std::optional(arguments.truth);
   if (found) {
-    const auto truth = read_ground_truth(*found);
-    if (!truth) return truth.error();
-    evaluate_trajectories(*estimate, *online, *truth, false, html);
+    auto read = read_ground_truth(*found);
+    if (!read) return read.error();
+    truth = std::move(*read);
+    evaluate_trajectories(*estimate, *online, *truth, with_scale, html);
     if (!html.report.ate.rmse_m) {
       return error("{}: fewer than three poses within 20 ms of those of {}", found->string(),
                    (arguments.folder / "trajectory.tum").string());
     }
   }
-  const auto scores = score_run(arguments, *description, *log, *estimate);
+  const auto poses = arguments.poses == "truth" ? true_poses(*estimate, truth, with_scale) : estimate;
+  if (!poses) return poses.error();
+  const auto scores = score_run(arguments, *description, **source, *log, *poses);
   if (!scores) return scores.error();
   if (scores->empty()) return error("{}: no frames to score among '{}'", arguments.folder.string(), arguments.frames);
   html.report.image = summarize(*scores);
@@ -98,6 +133,12 @@ void add_eval(CommandLine& line) {
   command.add_option("--truth", arguments->truth, "True trajectory: a file or a sequence folder");
   command.add_option("--frames", arguments->frames, "Frames whose images are scored")
       ->check(CLI::IsMember({"all", "keyframes", "held-out"}))
+      ->capture_default_str();
+  command
+      .add_option("--poses", arguments->poses,
+                  "Where images are rendered: at the run's own poses, or at the true ones, brought into its world by "
+                  "one alignment: what better poses alone would change")
+      ->check(CLI::IsMember({"estimate", "truth"}))
       ->capture_default_str();
   command.add_flag("--json", arguments->json, "Print JSON instead of the table");
   line.on_run(command, [arguments] { return eval(*arguments); });

@@ -26,10 +26,10 @@ struct ExportArguments {
 Result<std::vector<PosedCamera>> write_keyframe_images(const fs::path& run, const fs::path& images) {
   if (Status status = prepare_output_folder(images); !status) return status.error();
   std::vector<PosedCamera> cameras;
-  const Status status = for_each_keyframe_image(run, [&](FrameId id, PosedCamera camera, const ImageU8& image) {
-    camera.image = images / fmt::format("{:06}.png", id.value);
-    cameras.push_back(camera);
-    return write_png(camera.image, image);
+  const Status status = for_each_keyframe_image(run, [&](KeyframeImage keyframe) {
+    keyframe.camera.image = images / fmt::format("{:06}.png", keyframe.frame.value);
+    cameras.push_back(keyframe.camera);
+    return write_png(keyframe.camera.image, keyframe.image);
   });
   if (!status) return status.error();
   return cameras;

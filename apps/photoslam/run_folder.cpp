@@ -52,6 +52,11 @@ Result<RunDescription> read_run_description(const fs::path& folder) {
   }
 }
 
+Result<ExposureTrack> read_run_exposures(const fs::path& folder) {
+  if (!fs::exists(folder / kExposuresFile)) return ExposureTrack{};
+  return read_exposures(folder / kExposuresFile);
+}
+
 Status write_run_results(const fs::path& folder, const RunOutcome& run, size_t& map_bytes) {
   for (const auto& [name, trajectory] : {std::pair{"trajectory.tum", final_trajectory(run)},
                                          {"trajectory_online.tum", online_trajectory(run)},
@@ -59,6 +64,8 @@ Status write_run_results(const fs::path& folder, const RunOutcome& run, size_t& 
     if (Status status = write_tum_trajectory(folder / name, trajectory); !status) return status;
   }
   if (Status status = write_frame_log(folder / "frames.csv", frame_log(run)); !status) return status;
+  if (Status status = write_exposures(folder / kExposuresFile, keyframe_exposures(run, run.final)); !status)
+    return status;
   const fs::path map = folder / "map.ply";
   const auto written = write_gaussian_ply(map, to_world(run.final.gaussians, run.final.anchors_from_world));
   if (!written) return written.error();

@@ -13,6 +13,8 @@
 
 namespace photoslam {
 
+inline constexpr const char* kExposuresFile = "exposures.txt";
+
 /// Where a run's input came from and with what camera its map is rendered: run.json in the run's folder.
 struct RunDescription {
   std::filesystem::path dataset;
@@ -24,7 +26,10 @@ struct RunDescription {
 Status write_run_description(const std::filesystem::path& folder, const RunDescription& description);
 Result<RunDescription> read_run_description(const std::filesystem::path& folder);
 
-/// Writes trajectory.tum, trajectory_online.tum, keyframes.tum, frames.csv and map.ply, each atomically.
+/// The exposures of a run's keyframes; none for a run that is older than they are.
+Result<ExposureTrack> read_run_exposures(const std::filesystem::path& folder);
+
+/// Writes trajectory.tum, trajectory_online.tum, keyframes.tum, frames.csv, exposures.txt and map.ply, each atomically.
 /// Sets `map_bytes` to the size of map.ply.
 Status write_run_results(const std::filesystem::path& folder, const RunOutcome& run, size_t& map_bytes);
 

@@ -30,8 +30,7 @@ std::vector<SparsePoint> sparse_points(const GaussianTable& map) {
   return points;
 }
 
-Status for_each_keyframe_image(const std::filesystem::path& run,
-                               const std::function<Status(FrameId, const PosedCamera&, ImageU8)>& take) {
+Status for_each_keyframe_image(const std::filesystem::path& run, const std::function<Status(KeyframeImage)>& take) {
   const auto description = read_run_description(run);
   if (!description) return description.error();
   const auto keyframes = read_tum_trajectory(run / "keyframes.tum");
@@ -44,8 +43,9 @@ Status for_each_keyframe_image(const std::filesystem::path& run,
   while (auto frame = (*source)->next()) {
     const auto pose = pose_at.find(frame->timestamp_ns);
     if (pose == pose_at.end() || !frame->defect.empty()) continue;
-    const PosedCamera camera{rectifier.camera(), pose->second, {}};
-    if (Status status = take(frame->id, camera, rectifier.color(std::move(frame->color))); !status) return status;
+    KeyframeImage keyframe{frame->id, frame->timestamp_ns, {rectifier.camera(), pose->second, {}}, {}};
+    keyframe.image = rectifier.color(std::move(frame->color));
+    if (Status status = take(std::move(keyframe)); !status) return status;
   }
   return {};
 }

@@ -13,10 +13,16 @@
 
 namespace photoslam {
 
-/// Hands out the rectified picture of every keyframe of a run with its camera and final pose, in order of time; the
-/// dataset is read again for that.
-Status for_each_keyframe_image(const std::filesystem::path& run,
-                               const std::function<Status(FrameId, const PosedCamera&, ImageU8)>& take);
+/// The rectified picture of a keyframe, its camera and its final pose.
+struct KeyframeImage {
+  FrameId frame;
+  int64_t timestamp_ns = 0;
+  PosedCamera camera;
+  ImageU8 image;
+};
+
+/// Hands out the keyframes of a run in order of time; the dataset is read again for that.
+Status for_each_keyframe_image(const std::filesystem::path& run, const std::function<Status(KeyframeImage)>& take);
 
 /// The most solid gaussians of a map as points, at most 20000: a start for other trainers.
 std::vector<SparsePoint> sparse_points(const GaussianTable& map);

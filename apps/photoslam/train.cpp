@@ -20,6 +20,7 @@
 #include "photorealistic_mapping/posed_map.h"
 #include "photorealistic_mapping/view_geometry.h"
 #include "photorealistic_mapping/world_export.h"
+#include "run_folder.h"
 #include "run_images.h"
 
 namespace photoslam {
@@ -44,11 +45,13 @@ struct TrainArguments {
 /// Pictures with one camera and their poses, and the points that came with them.
 struct PosedImages {
   PinholeCamera camera;
-  std::vector<SE3> poses;       // camera_from_world
-  std::vector<ImageU8> images;  // RGB
+  std::vector<SE3> poses;                                     // camera_from_world
+  std::vector<ImageU8> images;                                // RGB
+  std::vector<std::optional<splatting::Exposure>> exposures;  // as a run has learnt them
+  std::vector<int64_t> times_ns;                              // of a run's keyframes; else empty
   std::vector<SparsePoint> points;
 
-  Status add(const PosedCamera& posed, const ImageU8& image) {
+  Status add(const PosedCamera& posed, const ImageU8& image, std::optional<splatting::Exposure> exposure = {}) {
     if (poses.empty()) camera = posed.camera;
     if (posed.camera != camera) {
       return error("{}: not the camera of the first image; all must share one", posed.image.string());
@@ -59,6 +62,7 @@ struct PosedImages {
     }
     poses.push_back(posed.camera_from_world);
     images.push_back(to_rgb(image));
+    exposures.push_back(exposure);
     return {};
   }
 };
@@ -98,7 +102,14 @@ Result<PosedImages> read_files(const fs::path& input) {
 
 Result<PosedImages> read_run(const fs::path& run) {
   PosedImages result;
-  const auto add = [&](FrameId, const PosedCamera& posed, const ImageU8& image) { return result.add(posed, image); };
+  const auto exposures = read_run_exposures(run);
+  if (!exposures) return exposures.error();
+  const auto add = [&](const KeyframeImage& keyframe) {
+    std::optional<splatting::Exposure> exposure;
+    if (!exposures->empty()) exposure = nearest_exposure(*exposures, keyframe.timestamp_ns);
+    result.times_ns.push_back(keyframe.timestamp_ns);
+    return result.add(keyframe.camera, keyframe.image, exposure);
+  };
   if (Status status = for_each_keyframe_image(run, add); !status) return status.error();
   const auto map = read_gaussian_ply(run / "map.ply");
   if (!map) return map.error();
@@ -142,6 +153,15 @@ Result<std::vector<splatting::Gaussian>> initial_gaussians(const TrainArguments&
   return gaussians;
 }
 
+/// Nothing but splitting and cloning adds to the gaussians to begin with, as in offline training.
+void densify_only(PhotorealisticOptions& options) {
+  options.depth.enabled = false;
+  options.seeding.dense = false;
+  options.seeding.inactive_features = false;
+  options.reseed_interval = 0;
+  options.densification.enabled = true;
+}
+
 bool is_held_out(const TrainArguments& arguments, size_t i) {
   return arguments.hold_out > 0 && static_cast<int>(i) % arguments.hold_out == arguments.hold_out - 1;
 }
@@ -162,7 +182,8 @@ void train_until_done(const TrainArguments& arguments, const std::stop_token& st
   }
 }
 
-/// Renders every picture from the trained map; writes the pairs, render beside truth, and prints the figures.
+/// Renders every picture from the trained map; writes the pairs, render beside truth, and prints the figures. A picture
+/// that was held out has the exposure of the one before it: nothing is learnt from it.
 Status score(const TrainArguments& arguments, const PosedImages& input, const FrozenMap& map, Executor& executor) {
   splatting::Renderer renderer;
   splatting::RenderResult result;
@@ -174,8 +195,10 @@ Status score(const TrainArguments& arguments, const PosedImages& input, const Fr
   for (size_t i = 0; i < input.poses.size(); ++i) {
     const bool held = is_held_out(arguments, i);
     const SE3& pose = held ? input.poses[i] : map.keyframes_from_world[next_keyframe++];
+    const size_t nearest = std::max<size_t>(next_keyframe, 1) - 1;
     camera_from_anchors(pose, map.anchors_from_world, camera_from_anchor);
     renderer.render(map.gaussians, {to_splatting(input.camera), camera_from_anchor}, {}, executor, result);
+    apply(map.keyframe_exposures[nearest], result);
     const ImageF render = to_image(result);
     (held ? held_out : trained).push_back(score_frame(FrameId(static_cast<int32_t>(i)), 0, render, input.images[i]));
     ImageU8 pair(2 * input.camera.width, input.camera.height, 3);
@@ -195,6 +218,20 @@ Status score(const TrainArguments& arguments, const PosedImages& input, const Fr
   return {};
 }
 
+/// map.ply, and for the keyframes of a run exposures.txt; returns the number of gaussians.
+Result<size_t> write_map(const TrainArguments& arguments, const PosedImages& input, const FrozenMap& map) {
+  const auto written =
+      write_gaussian_ply(arguments.output / "map.ply", to_world(map.gaussians, map.anchors_from_world));
+  if (!written) return written.error();
+  if (input.times_ns.empty()) return written->written;
+  ExposureTrack track;
+  for (size_t i = 0; i < input.times_ns.size(); ++i) {
+    if (!is_held_out(arguments, i)) track.push_back({input.times_ns[i], map.keyframe_exposures[track.size()]});
+  }
+  if (Status status = write_exposures(arguments.output / kExposuresFile, track); !status) return status.error();
+  return written->written;
+}
+
 Status train(const TrainArguments& arguments) {
   if (arguments.input.empty() == arguments.run.empty()) {
     throw CLI::ValidationError("give either posed images or --poses RUN");
@@ -208,7 +245,7 @@ Status train(const TrainArguments& arguments) {
   if (Status status = prepare_output_folder(arguments.output); !status) return status;
   const auto gpu = arguments.backend.open();
   if (!gpu) return gpu.error();
-  if (!start->empty()) options->photorealistic_mapping.depth.enabled = false;
+  if (!start->empty()) densify_only(options->photorealistic_mapping);
 
   const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   ThreadPool executor(arguments.threads > 0 ? arguments.threads : cores);
@@ -217,7 +254,9 @@ Status train(const TrainArguments& arguments) {
   for (size_t i = 0; i < input->poses.size(); ++i) {
     if (!is_held_out(arguments, i)) poses.push_back(input->poses[i]);
   }
-  for (const SparsePoint& point : input->points) points.push_back(point.position);
+  if (start->empty()) {
+    for (const SparsePoint& point : input->points) points.push_back(point.position);
+  }
   const auto map = posed_map(input->camera, poses, points);
   fmt::print(stderr, "{} images {}x{}, {} of them to train on\n", input->images.size(), input->camera.width,
              input->camera.height, poses.size());
@@ -227,17 +266,16 @@ Status train(const TrainArguments& arguments) {
   int32_t keyframe = 0;
   for (size_t i = 0; i < input->images.size(); ++i) {
     if (is_held_out(arguments, i)) continue;
-    mapper.add_keyframe(*map, KeyframeId(keyframe++), {input->images[i], {}, {}}, executor);
+    mapper.add_keyframe(*map, KeyframeId(keyframe++), {input->images[i], {}, {}}, executor, input->exposures[i]);
   }
   mapper.add_gaussians(*start);
   train_until_done(arguments, interrupt.token(), executor, mapper);
 
   const FrozenMap trained = mapper.freeze();
   report_failure(gpu->get());
-  const auto written =
-      write_gaussian_ply(arguments.output / "map.ply", to_world(trained.gaussians, trained.anchors_from_world));
+  const auto written = write_map(arguments, *input, trained);
   if (!written) return written.error();
-  fmt::print("  {:<18}{} gaussians after {} iterations: {}\n", "map", written->written, mapper.num_iterations(),
+  fmt::print("  {:<18}{} gaussians after {} iterations: {}\n", "map", *written, mapper.num_iterations(),
              (arguments.output / "map.ply").string());
   return score(arguments, *input, trained, executor);
 }

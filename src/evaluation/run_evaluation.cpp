@@ -3,7 +3,6 @@
 #include "evaluation/run_evaluation.h"
 
 #include <algorithm>
-#include <map>
 #include <set>
 #include <thread>
 
@@ -25,30 +24,9 @@ std::string describe_machine() {
   return fmt::format("{} cores, {}", std::thread::hardware_concurrency(), build_description());
 }
 
-/// Which keyframe was made at which time.
-std::map<int64_t, KeyframeId> keyframe_times(const RunOutcome& run) {
-  std::map<int64_t, KeyframeId> times;
-  for (const FrameOutcome& frame : run.frames) {
-    if (frame.keyframe.valid()) times[frame.timestamp_ns] = frame.keyframe;
-  }
-  return times;
-}
-
-/// The exposure of the keyframe nearest in time.
-splatting::Exposure nearest_exposure(const std::map<int64_t, KeyframeId>& times, const FrozenMap& map, int64_t time) {
-  if (times.empty()) return {};
-  auto nearest = times.lower_bound(time);
-  if (nearest == times.end() ||
-      (nearest != times.begin() && time - std::prev(nearest)->first < nearest->first - time)) {
-    --nearest;
-  }
-  const auto index = static_cast<size_t>(nearest->second.value);
-  return index < map.keyframe_exposures.size() ? map.keyframe_exposures[index] : splatting::Exposure{};
-}
-
 ScoringTask scoring_task(const RunOutcome& run, const FrozenMap& map) {
   ScoringTask task{&map.gaussians, map.anchors_from_world, {}};
-  const auto times = keyframe_times(run);
+  const ExposureTrack exposures = keyframe_exposures(run, map);
   for (const FrameOutcome& frame : run.frames) {
     const auto id = static_cast<size_t>(frame.frame.value);
     if (id >= task.camera_from_world.size()) {
@@ -56,7 +34,7 @@ ScoringTask scoring_task(const RunOutcome& run, const FrozenMap& map) {
       task.exposures.resize(id + 1);
     }
     task.camera_from_world[id] = camera_from_world(frame, map);
-    task.exposures[id] = nearest_exposure(times, map, frame.timestamp_ns);
+    task.exposures[id] = nearest_exposure(exposures, frame.timestamp_ns);
   }
   return task;
 }
@@ -171,6 +149,9 @@ HtmlReport evaluate_run(const RunOutcome& run, const SystemOptions& options, Fra
         fmt::format("{} of {} tracked frames are in maps that could not be connected with the largest "
                     "one; the trajectory leaves them out",
                     tracked - connected, tracked));
+  }
+  if (options.photorealistic_mapping.exposure.enabled) {
+    html.notes.emplace_back("renders have the exposure of the keyframe nearest in time, learnt from that keyframe");
   }
   html.frames = frame_log(run);
   summarize(html.frames, html.report);

@@ -11,7 +11,8 @@
 namespace photoslam {
 
 void ExposureOptions::visit(OptionVisitor& v) {
-  v.value({"enabled", "", 0, 0, "Learn gain and bias of every keyframe; renders are scored with the nearest one's."},
+  v.value({"enabled", "", 0, 0,
+           "Learn gain and bias of every keyframe; renders are scored with those of the nearest in time."},
           enabled);
   v.value({"gain_rate", "", 0.0, 1.0, "Step size of Adam for the logarithms of the gains."}, gain_rate);
   v.value({"bias_rate", "", 0.0, 1.0, "Step size of Adam for the biases; 0: gains only."}, bias_rate);
@@ -25,6 +26,13 @@ splatting::Exposure ExposureAdjustment::exposure() const {
     exposure.bias[c] = static_cast<float>(parameters_[3 + c]);
   }
   return exposure;
+}
+
+void ExposureAdjustment::start_from(const splatting::Exposure& exposure) {
+  for (size_t c = 0; c < 3; ++c) {
+    parameters_[c] = std::log(static_cast<double>(exposure.gain[c]));
+    parameters_[3 + c] = static_cast<double>(exposure.bias[c]);
+  }
 }
 
 void ExposureAdjustment::match(const ImageU8& picture, const splatting::RenderResult& render) {

@@ -15,7 +15,7 @@ namespace photoslam {
 class Archive;
 
 struct ExposureOptions {
-  bool enabled = false;
+  bool enabled = true;
   double gain_rate = 0.003;
   double bias_rate = 0;
   double decay = 0.001;
@@ -23,8 +23,8 @@ struct ExposureOptions {
 };
 
 /// How one keyframe's camera rendered brightness, against the gaussians: picture = gain * render + bias, per channel.
-/// Starts as identity. The first keyframe is left at it, and the others decay towards it, so that the
-/// brightness of the map cannot drift.
+/// Starts as identity, or as it is known from elsewhere. The first keyframe is left at it, and the others decay towards
+/// it, so that the brightness of the map cannot drift.
 class ExposureAdjustment {
  public:
   splatting::Exposure exposure() const;
@@ -33,8 +33,8 @@ class ExposureAdjustment {
   /// unless values are left out by their brightness. The worse render and picture agree, the less the ratio counts, for
   /// then it tells what the map lacks rather than the exposure. The picture has the render's size.
   void match(const ImageU8& picture, const splatting::RenderResult& render);
-  /// Takes over another keyframe's.
-  void start_from(const ExposureAdjustment& other) { parameters_ = other.parameters_; }
+  /// Takes over what was learnt before; gains are positive.
+  void start_from(const splatting::Exposure& exposure);
 
   /// One step of Adam against dL/d(gain rgb, bias rgb).
   void step(const ExposureOptions& options, double rate_factor, std::span<const float, 6> gradient);

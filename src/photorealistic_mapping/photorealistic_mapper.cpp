@@ -133,7 +133,7 @@ void PhotorealisticMapper::rescale(size_t index, double factor) {
 }
 
 void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, const KeyframeImages& images,
-                                        Executor& executor) {
+                                        Executor& executor, const std::optional<splatting::Exposure>& exposure) {
   PHOTOSLAM_CHECK(static_cast<size_t>(id.value) == views_.size(), "keyframe {} after {}", id.value, views_.size());
   const Keyframe& keyframe = map.keyframe(id).keyframe;
   anchors_from_world_.push_back(keyframe.camera_from_world);
@@ -142,9 +142,15 @@ void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, c
   schedule_.add_view();
   update_poses(map);
 
-  set_images(images.color, images.depth, views_.emplace_back());
-  if (views_.size() > 1) views_.back().exposure.start_from(views_[views_.size() - 2].exposure);
-  if (!images.right.empty()) views_.back().right = shrink_color(images.right, kSeedingFactor);
+  TrainingView& newest = views_.emplace_back();
+  set_images(images.color, images.depth, newest);
+  newest.exposure_is_known = options_.exposure.enabled && exposure;
+  if (newest.exposure_is_known) {
+    newest.exposure.start_from(*exposure);
+  } else if (views_.size() > 1) {
+    newest.exposure.start_from(views_[views_.size() - 2].exposure.exposure());
+  }
+  if (!images.right.empty()) newest.right = shrink_color(images.right, kSeedingFactor);
   const size_t index = views_.size() - 1;
   // A single camera's first keyframe has none before it to compare with: it gets its depth from the second.
   if (index > 0 && views_[index - 1].picture.depth.empty()) seed_keyframe(map, index - 1, executor);
@@ -247,7 +253,8 @@ void PhotorealisticMapper::seed(size_t index, int cell, double min_color_error, 
   TrainingView& view = views_[index];
   const DepthPicture& picture = view.picture;
   render_picture(index, executor);
-  if (options_.exposure.enabled && index > 0 && schedule_.uses(static_cast<int>(index)) == 0) {
+  const bool unused = schedule_.uses(static_cast<int>(index)) == 0;
+  if (options_.exposure.enabled && index > 0 && unused && !view.exposure_is_known) {
     view.exposure.match(picture.color, render_);
   }
   const splatting::Exposure exposure = view.exposure.exposure();

@@ -94,8 +94,10 @@ class PhotorealisticMapper {
   /// all that is measured in its frame grows with it.
   void update_poses(const MapSnapshot& map);
 
-  /// Starts training on the next keyframe (by id) and seeds the part of its image that the map does not explain.
-  void add_keyframe(const MapSnapshot& map, KeyframeId id, const KeyframeImages& images, Executor& executor);
+  /// Starts training on the next keyframe (by id) and seeds the part of its image that the map does not explain. An
+  /// exposure learnt before is taken over; without one it is found by comparing the image with the map.
+  void add_keyframe(const MapSnapshot& map, KeyframeId id, const KeyframeImages& images, Executor& executor,
+                    const std::optional<splatting::Exposure>& exposure = {});
 
   /// Adds gaussians from elsewhere, given in the world frame, to the first keyframe; there must be one.
   void add_gaussians(std::span<const splatting::Gaussian> in_world);
@@ -129,6 +131,7 @@ class PhotorealisticMapper {
   struct TrainingView {
     PoseAdjustment adjustment;  // photometric correction of the keyframe's pose
     ExposureAdjustment exposure;
+    bool exposure_is_known = false;      // from elsewhere; the map is not asked
     std::vector<PinholeCamera> cameras;  // [levels + 1]
     std::vector<splatting::TargetImage> targets;
     DepthPicture picture;  // half the size, for seeding

@@ -67,11 +67,12 @@ class WallWithKeyframes {
 
 class PhotorealisticMapperTest : public ::testing::Test {
  protected:
-  void add(PhotorealisticMapper& mapper, const SE3& pose, KeyframeImages images, double gain = 1.0) {
+  void add(PhotorealisticMapper& mapper, const SE3& pose, KeyframeImages images, double gain = 1.0,
+           const std::optional<splatting::Exposure>& known = {}) {
     world_.add(pose);
     images.color = to_rgb(world_.picture(pose));
     for (uint8_t& v : images.color.values()) v = static_cast<uint8_t>(std::lround(std::min(255.0, gain * v)));
-    mapper.add_keyframe(*world_.snapshot(), KeyframeId(count_++), images, executor_);
+    mapper.add_keyframe(*world_.snapshot(), KeyframeId(count_++), images, executor_, known);
   }
   /// Share of the gaussians within `tolerance` of the wall's depth, seen from the first keyframe.
   double share_on_the_wall(const PhotorealisticMapper& mapper, double tolerance) const {
@@ -149,6 +150,16 @@ TEST_F(PhotorealisticMapperTest, ExposureIsToldFromColor) {
   EXPECT_GT(psnr[1], psnr[0] + 3);
 }
 
+TEST_F(PhotorealisticMapperTest, AKnownExposureIsTakenOver) {
+  PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
+  add(mapper, at(0), stereo(at(0)));
+  const splatting::Exposure known{{0.5f, 0.6f, 0.7f}, {0, 0, 0}};
+  add(mapper, at(0.3), stereo(at(0.3)), 0.9, known);
+  const auto exposures = mapper.freeze().keyframe_exposures;
+  EXPECT_EQ(exposures[0].gain[0], 1);
+  for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(exposures[1].gain[c], known.gain[c], 1e-6f) << "not what the picture says";
+}
+
 TEST_F(PhotorealisticMapperTest, GaussiansFollowTheirKeyframe) {
   PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
   add(mapper, at(0), stereo(at(0)));
@@ -180,6 +191,7 @@ std::vector<float> render(const FrozenMap& map, const SE3& camera_from_world, Ex
 TEST_F(PhotorealisticMapperTest, ASimilarityOfMapAndCamerasLeavesEveryImageTheSame) {
   PhotorealisticOptions options;
   options.sh_degree = 3;
+  options.exposure.enabled = false;  // brightness stays
   PhotorealisticMapper mapper(options, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
   for (const double x : {0.0, 0.3, 0.6}) add(mapper, at(x), stereo(at(x)));
   for (int i = 0; i < 60; ++i) mapper.train({}, executor_);

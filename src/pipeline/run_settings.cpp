@@ -63,4 +63,14 @@ Trajectory keyframe_trajectory(const RunOutcome& run) {
   return trajectory;
 }
 
+ExposureTrack keyframe_exposures(const RunOutcome& run, const FrozenMap& map) {
+  ExposureTrack track;
+  for (const FrameOutcome& frame : run.frames) {
+    const auto keyframe = static_cast<size_t>(frame.keyframe.value);
+    if (!frame.keyframe.valid() || keyframe >= map.keyframe_exposures.size()) continue;
+    track.push_back({frame.timestamp_ns, map.keyframe_exposures[keyframe]});
+  }
+  return track;
+}
+
 }  // namespace photoslam

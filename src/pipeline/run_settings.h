@@ -13,6 +13,7 @@
 #include "base/ids.h"
 #include "io/trajectory_file.h"
 #include "localization/tracker.h"
+#include "photorealistic_mapping/exposure_file.h"
 #include "photorealistic_mapping/photorealistic_mapper.h"
 
 namespace photoslam {
@@ -96,5 +97,8 @@ std::vector<FrameOutcome> connected_frames(const RunOutcome& run);
 Trajectory final_trajectory(const RunOutcome& run);
 Trajectory online_trajectory(const RunOutcome& run);
 Trajectory keyframe_trajectory(const RunOutcome& run);
+
+/// The exposures that a map has for the keyframes made in this run.
+ExposureTrack keyframe_exposures(const RunOutcome& run, const FrozenMap& map);
 
 }  // namespace photoslam
