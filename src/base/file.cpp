@@ -3,9 +3,12 @@
 #include "base/file.h"
 
 #include <fcntl.h>
+#include <signal.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <charconv>
+#include <chrono>
 #include <cstring>
 #include <fstream>
 #include <sstream>
@@ -27,11 +30,29 @@ Status write_all(int descriptor, std::span<const std::byte> content, const std::
   return {};
 }
 
+constexpr std::string_view kTemporary = ".photoslam.tmp";
+
+/// Whether it is the temporary file of a process that was killed. Folders may be shared with machines whose processes
+/// are not seen here: what was touched within the last minute may still be written.
+bool is_left_behind(const std::filesystem::path& path) {
+  const std::string name = path.filename();
+  if (!name.ends_with(kTemporary)) return false;
+  const std::string_view stem = std::string_view(name).substr(0, name.size() - kTemporary.size());
+  const std::string_view digits = stem.substr(stem.rfind('.') + 1);
+  pid_t process = 0;
+  const auto [end, problem] = std::from_chars(digits.data(), digits.data() + digits.size(), process);
+  if (problem != std::errc{} || end != digits.data() + digits.size() || process <= 0) return false;
+  if (::kill(process, 0) == 0 || errno != ESRCH) return false;
+  std::error_code code;
+  const auto age = std::filesystem::file_time_type::clock::now() - std::filesystem::last_write_time(path, code);
+  return !code && age > std::chrono::minutes(1);
+}
+
 }  // namespace
 
 Status write_file_atomically(const std::filesystem::path& path, std::initializer_list<std::string_view> pieces) {
   std::filesystem::path temporary = path;
-  temporary += fmt::format(".{}.tmp", ::getpid());
+  temporary += fmt::format(".{}{}", ::getpid(), kTemporary);
   const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (descriptor < 0) return system_error("create", temporary);
 
@@ -77,6 +98,11 @@ Status prepare_output_folder(const std::filesystem::path& folder) {
   }
   ::close(descriptor);
   ::unlink(probe.c_str());
+  std::vector<std::filesystem::path> leftovers;
+  for (std::filesystem::directory_iterator entry(folder, code), end; !code && entry != end; entry.increment(code)) {
+    if (is_left_behind(entry->path())) leftovers.push_back(entry->path());
+  }
+  for (const std::filesystem::path& leftover : leftovers) ::unlink(leftover.c_str());
   return {};
 }
 

@@ -23,7 +23,8 @@ Status write_file_atomically(const std::filesystem::path& path, std::initializer
 /// Reads a whole file; the error names the path and the reason.
 Result<std::string> read_file(const std::filesystem::path& path);
 
-/// Creates the folder (and its parents) and checks that files can be written there.
+/// Creates the folder (and its parents) and checks that files can be written there. Removes what killed processes left
+/// behind of their atomic writes.
 Status prepare_output_folder(const std::filesystem::path& folder);
 
 }  // namespace photoslam

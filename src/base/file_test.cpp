@@ -3,7 +3,11 @@
 #include "base/file.h"
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 #include <unistd.h>
+
+#include <chrono>
+#include <fstream>
 
 namespace photoslam {
 namespace {
@@ -42,6 +46,24 @@ TEST_F(FileTest, ErrorsNameThePath) {
 TEST_F(FileTest, OutputFolderIsCreated) {
   ASSERT_TRUE(prepare_output_folder(folder / "a" / "b").ok());
   EXPECT_TRUE(fs::is_empty(folder / "a" / "b"));
+}
+
+TEST_F(FileTest, OnlyTemporaryFilesOfKilledProcessesAreRemoved) {
+  const pid_t child = ::fork();
+  if (child == 0) ::_exit(0);
+  ASSERT_EQ(::waitpid(child, nullptr, 0), child);  // a process that is no more
+  const auto make = [&](const std::string& name, int minutes_old) {
+    std::ofstream(folder / name) << "half";
+    fs::last_write_time(folder / name, fs::file_time_type::clock::now() - std::chrono::minutes(minutes_old));
+  };
+  make(fmt::format("session.photoslam.{}.photoslam.tmp", child), 5);
+  const std::vector<std::string> others = {fmt::format("session.photoslam.{}.photoslam.tmp", ::getpid()),
+                                           fmt::format("fresh.{}.photoslam.tmp", child),
+                                           fmt::format("other.{}.tmp", child), "name.x1.photoslam.tmp"};
+  for (const std::string& name : others) make(name, name.starts_with("fresh") ? 0 : 5);
+  ASSERT_TRUE(prepare_output_folder(folder).ok());
+  for (const std::string& name : others) EXPECT_TRUE(fs::exists(folder / name)) << name;
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), {}), static_cast<std::ptrdiff_t>(others.size()));
 }
 
 }  // namespace
