@@ -26,9 +26,7 @@ def variants() -> dict[str, list[str]]:
     for geometry in (False, True):
         for levels in (0, 1, 2, 3):
             name = f"{'with' if geometry else 'without'} Geo, pyramid {levels}"
-            table[name] = ([] if geometry else NO_GEOMETRY) + [f"schedule.pyramid_levels={levels}"]
-            if levels == 0:
-                table[name].append("schedule.online_level=0")
+            table[name] = ([] if geometry else NO_GEOMETRY) + [f"schedule.pyramid_levels={levels}", "schedule.start_pixels=1"]
     return table
 
 

@@ -6,6 +6,7 @@
 #include <memory>
 #include <thread>
 
+#include "base/file.h"
 #include "commands.h"
 #include "evaluation/map_scoring.h"
 #include "evaluation/run_evaluation.h"
@@ -23,6 +24,7 @@ struct EvalArguments {
   fs::path truth;
   std::string frames = "all";
   std::string poses = "estimate";
+  fs::path table;
   bool json = false;
 };
 
@@ -82,6 +84,15 @@ Result<std::vector<FrameScore>> score_run(const EvalArguments& arguments, const 
   return score_maps(source, std::span(&task, 1), {}, executor).front().scores;
 }
 
+std::string as_csv(const std::vector<FrameScore>& scores) {
+  std::string csv = "frame,timestamp,psnr_db,ssim\n";
+  for (const FrameScore& s : scores) {
+    csv += fmt::format("{},{:.9f},{:.4f},{:.5f}\n", s.frame.value, 1e-9 * static_cast<double>(s.timestamp_ns), s.psnr_db,
+                       s.ssim);
+  }
+  return csv;
+}
+
 Status eval(const EvalArguments& arguments) {
   const auto description = read_run_description(arguments.folder);
   if (!description) return description.error();
@@ -117,6 +128,9 @@ Status eval(const EvalArguments& arguments) {
   const auto scores = score_run(arguments, *description, **source, *log, *poses);
   if (!scores) return scores.error();
   if (scores->empty()) return error("{}: no frames to score among '{}'", arguments.folder.string(), arguments.frames);
+  if (!arguments.table.empty()) {
+    if (Status status = write_file_atomically(arguments.table, as_csv(*scores)); !status) return status;
+  }
   html.report.image = summarize(*scores);
   fmt::print("{}", arguments.json ? to_json(html.report) : result_table(html.report));
   return {};
@@ -140,6 +154,7 @@ void add_eval(CommandLine& line) {
                   "one alignment: what better poses alone would change")
       ->check(CLI::IsMember({"estimate", "truth"}))
       ->capture_default_str();
+  command.add_option("--table", arguments->table, "Also write PSNR and SSIM of each frame to this CSV file");
   command.add_flag("--json", arguments->json, "Print JSON instead of the table");
   line.on_run(command, [arguments] { return eval(*arguments); });
 }

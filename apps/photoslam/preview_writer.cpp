@@ -49,12 +49,25 @@ ImageU8 draw_trajectory(const std::vector<Vec3>& positions, int size) {
   return plot;
 }
 
+/// Active features and the others, on the left picture.
+void draw_features(const KeyframeComparison& comparison, ImageU8& preview) {
+  constexpr uint8_t kActive[3] = {40, 200, 60}, kInactive[3] = {240, 140, 20};
+  for (const bool active : {false, true}) {
+    for (const DepthPixel& feature : comparison.features) {
+      if (feature.active != active) continue;
+      const auto x = static_cast<int>(0.5f * feature.x), y = static_cast<int>(0.5f * feature.y);
+      if (x + 1 < comparison.picture.width()) draw_dot(preview, x, y, 1, active ? kActive : kInactive);
+    }
+  }
+}
+
 }  // namespace
 
 ImageU8 compose_preview(const Progress& progress) {
   const ImageU8& picture = progress.comparison->picture;
   ImageU8 preview(2 * picture.width() + picture.height(), picture.height(), 3);
   copy_into(picture, 0, preview);
+  draw_features(*progress.comparison, preview);
   copy_into(progress.comparison->render, picture.width(), preview);
   copy_into(draw_trajectory(progress.positions, picture.height()), 2 * picture.width(), preview);
   return preview;

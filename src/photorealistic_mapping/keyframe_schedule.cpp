@@ -9,12 +9,28 @@
 
 namespace photoslam {
 
+namespace {
+
+/// The first level on which a picture has no more pixels than this, or the last one.
+int first_level_within(int64_t pixels, int width, int height, int last) {
+  int level = 0;
+  while (level < last && int64_t{width >> level} * (height >> level) > pixels) ++level;
+  return level;
+}
+
+}  // namespace
+
 void ScheduleOptions::visit(OptionVisitor& v) {
-  v.value({"pyramid_levels", "", 0, 3, "Levels above the full image on which training starts; n in Eq. (5)."},
+  v.value({"start_pixels", "", 1, 1000000000,
+           "Training of a keyframe starts on the first level whose pictures have no more pixels than this …"},
+          start_pixels);
+  v.value({"pyramid_levels", "", 0, 3, "… but at most so many levels above the full image; n in Eq. (5)."},
           pyramid_levels);
   v.value({"uses_per_level", "", 1, 1000, "Training steps of a keyframe before it moves to the next finer level."},
           uses_per_level);
-  v.value({"online_level", "", 0, 3, "Finest level while frames arrive; 1 is half resolution."}, online_level);
+  v.value({"online_pixels", "", 1, 1000000000,
+           "While frames arrive, the finest level is the first whose pictures have no more pixels than this."},
+          online_pixels);
   v.value({"newest_probability", "", 0.0, 1.0, "Share of the steps that go to the newest keyframe."},
           newest_probability);
   v.value({"worse_probability", "", 0.0, 1.0,
@@ -27,6 +43,12 @@ void ScheduleOptions::visit(OptionVisitor& v) {
       seam_px);
   v.value({"seam_uses", "", 0, 1000, "… so many times."}, seam_uses);
 }
+
+KeyframeSchedule::KeyframeSchedule(const ScheduleOptions& options, int width, int height, uint64_t seed)
+    : options_(options),
+      coarsest_level_(first_level_within(options.start_pixels, width, height, options.pyramid_levels)),
+      online_level_(first_level_within(options.online_pixels, width, height, coarsest_level_)),
+      random_(seed) {}
 
 void KeyframeSchedule::add_view() {
   active_.push_back(num_views());
@@ -85,8 +107,8 @@ KeyframeSchedule::Choice KeyframeSchedule::next(bool refining) {
     choice.view = worse ? draw_worse() : draw();
   }
   int& uses = uses_[static_cast<size_t>(choice.view)];
-  const int finest = refining ? 0 : std::min(options_.online_level, options_.pyramid_levels);
-  choice.level = std::max(finest, options_.pyramid_levels - uses / options_.uses_per_level);
+  const int finest = refining ? 0 : online_level_;
+  choice.level = std::max(finest, coarsest_level_ - uses / options_.uses_per_level);
   ++uses;
   return choice;
 }

@@ -14,9 +14,10 @@ namespace photoslam {
 class Archive;
 
 struct ScheduleOptions {
-  int pyramid_levels = 2;
+  int pyramid_levels = 3;
+  int start_pixels = 32000;
   int uses_per_level = 4;
-  int online_level = 1;
+  int online_pixels = 130000;
   double newest_probability = 0.2;
   double worse_probability = 0;
   double seam_px = 2.0;
@@ -26,9 +27,10 @@ struct ScheduleOptions {
 
 /// Which keyframe is trained next, and on which level of its pyramid (paper, Sec. 3.4, Eq. 5).
 ///
-/// Each keyframe starts at the coarsest level n = pyramid_levels and moves down one level every uses_per_level uses,
-/// until it reaches the finest one allowed: online_level while frames arrive, the full image in refinement. Keyframes
-/// at which a correction of the map left a seam go before all others.
+/// Each keyframe starts at the coarsest level n and moves down one level every uses_per_level uses, until it reaches the
+/// finest one allowed: the full image in refinement, less while frames arrive where that is too costly. What counts is
+/// how large the pictures are, so the levels follow from that. Keyframes at which a correction of the map left a seam go
+/// before all others.
 class KeyframeSchedule {
  public:
   struct Choice {
@@ -36,7 +38,12 @@ class KeyframeSchedule {
     int level = 0;  ///< 0 is the full resolution; level l is shrunk by 2^l.
   };
 
-  KeyframeSchedule(const ScheduleOptions& options, uint64_t seed) : options_(options), random_(seed) {}
+  KeyframeSchedule(const ScheduleOptions& options, int width, int height, uint64_t seed);
+
+  /// n in Eq. (5).
+  int coarsest_level() const { return coarsest_level_; }
+  /// The finest one while frames arrive.
+  int online_level() const { return online_level_; }
 
   void add_view();
   /// This view does not come again.
@@ -66,6 +73,7 @@ class KeyframeSchedule {
   int take(std::vector<int>& views);
 
   ScheduleOptions options_;
+  int coarsest_level_, online_level_;
   Random random_;
   std::vector<int> uses_;
   std::vector<double> losses_;  // as last reported; views not trained yet come first

@@ -11,10 +11,10 @@ namespace {
 
 TEST(KeyframeSchedule, LevelsFallWithUseAsInEquationFive) {
   ScheduleOptions options;
-  options.pyramid_levels = 2;
+  options.start_pixels = 160 * 120;
   options.uses_per_level = 3;
-  options.online_level = 0;
-  KeyframeSchedule schedule(options, 1);
+  options.online_pixels = 640 * 480;
+  KeyframeSchedule schedule(options, 640, 480, 1);
   schedule.add_view();
   std::vector<int> levels;
   for (int i = 0; i < 8; ++i) levels.push_back(schedule.next(false).level);
@@ -23,8 +23,8 @@ TEST(KeyframeSchedule, LevelsFallWithUseAsInEquationFive) {
 
 TEST(KeyframeSchedule, OnlineStopsAtItsLevelAndRefinementGoesOn) {
   ScheduleOptions options;
-  options.online_level = 1;
-  KeyframeSchedule schedule(options, 1);
+  options.online_pixels = 320 * 240;
+  KeyframeSchedule schedule(options, 640, 480, 1);
   schedule.add_view();
   int finest_online = 3;
   for (int i = 0; i < 50; ++i) finest_online = std::min(finest_online, schedule.next(false).level);
@@ -32,16 +32,26 @@ TEST(KeyframeSchedule, OnlineStopsAtItsLevelAndRefinementGoesOn) {
   EXPECT_EQ(schedule.next(true).level, 0);
 }
 
-TEST(KeyframeSchedule, WithoutAPyramidEverythingIsFullResolution) {
+TEST(KeyframeSchedule, LevelsFollowTheSizeOfThePicture) {
   ScheduleOptions options;
+  options.start_pixels = 160 * 120;
+  options.online_pixels = 320 * 240;
+  options.pyramid_levels = 3;
+  const auto levels = [&](int width, int height) {
+    const KeyframeSchedule schedule(options, width, height, 1);
+    return std::pair(schedule.coarsest_level(), schedule.online_level());
+  };
+  EXPECT_EQ(levels(160, 120), std::pair(0, 0));
+  EXPECT_EQ(levels(320, 240), std::pair(1, 0));
+  EXPECT_EQ(levels(322, 240), std::pair(2, 1));
+  EXPECT_EQ(levels(640, 480), std::pair(2, 1));
+  EXPECT_EQ(levels(2560, 1920), std::pair(3, 3));  // there is no coarser one
   options.pyramid_levels = 0;
-  KeyframeSchedule schedule(options, 1);
-  schedule.add_view();
-  for (int i = 0; i < 10; ++i) EXPECT_EQ(schedule.next(false).level, 0);
+  EXPECT_EQ(levels(640, 480), std::pair(0, 0));
 }
 
 TEST(KeyframeSchedule, EveryViewComesOncePerRound) {
-  KeyframeSchedule schedule({}, 3);
+  KeyframeSchedule schedule({}, 640, 480, 3);
   for (int i = 0; i < 7; ++i) schedule.add_view();
   std::map<int, int> uses;
   for (int i = 0; i < 7 * 5; ++i) ++uses[schedule.next(true).view];
@@ -51,7 +61,7 @@ TEST(KeyframeSchedule, EveryViewComesOncePerRound) {
 TEST(KeyframeSchedule, TheNewestViewGetsItsShare) {
   ScheduleOptions options;
   options.newest_probability = 0.3;
-  KeyframeSchedule schedule(options, 4);
+  KeyframeSchedule schedule(options, 640, 480, 4);
   for (int i = 0; i < 100; ++i) schedule.add_view();
   int newest = 0;
   constexpr int kDraws = 20000;
@@ -61,7 +71,7 @@ TEST(KeyframeSchedule, TheNewestViewGetsItsShare) {
 }
 
 TEST(KeyframeSchedule, ARetiredViewDoesNotComeAgain) {
-  KeyframeSchedule schedule({}, 6);
+  KeyframeSchedule schedule({}, 640, 480, 6);
   for (int i = 0; i < 5; ++i) schedule.add_view();
   schedule.next(true);  // a round has begun
   schedule.retire(1);
@@ -76,7 +86,7 @@ TEST(KeyframeSchedule, ARetiredViewDoesNotComeAgain) {
 TEST(KeyframeSchedule, TheWorseViewOutOfTwoComes) {
   ScheduleOptions options;
   options.worse_probability = 1;
-  KeyframeSchedule schedule(options, 7);
+  KeyframeSchedule schedule(options, 640, 480, 7);
   constexpr int kViews = 5, kDraws = 20000;
   for (int i = 0; i < kViews; ++i) {
     schedule.add_view();
@@ -93,7 +103,7 @@ TEST(KeyframeSchedule, TheWorseViewOutOfTwoComes) {
 TEST(KeyframeSchedule, ViewsAtSeamsGoFirst) {
   ScheduleOptions options;
   options.seam_uses = 3;
-  KeyframeSchedule schedule(options, 5);
+  KeyframeSchedule schedule(options, 640, 480, 5);
   for (int i = 0; i < 10; ++i) schedule.add_view();
   schedule.revisit(std::vector{2, 5});
   EXPECT_EQ(schedule.next(true).view % 3, 2);

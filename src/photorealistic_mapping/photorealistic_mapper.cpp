@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "base/check.h"
@@ -29,6 +30,12 @@ DepthPicture make_picture(const CameraView& full, double metres_per_depth_unit) 
   std::ranges::transform(small.depth.values(), picture.depth.values().begin(),
                          [&](uint16_t depth) { return static_cast<float>(depth * metres_per_depth_unit); });
   return picture;
+}
+
+/// A GPU has no reason to spare pixels.
+ScheduleOptions schedule_options(ScheduleOptions options, bool on_gpu) {
+  if (on_gpu) options.online_pixels = std::numeric_limits<int>::max();
+  return options;
 }
 
 }  // namespace
@@ -81,7 +88,8 @@ PhotorealisticMapper::PhotorealisticMapper(const PhotorealisticOptions& options,
     : options_(options),
       sensor_(std::move(sensor)),
       random_(seed),
-      schedule_(options.schedule, seed + 1),
+      schedule_(schedule_options(options.schedule, gpu != nullptr), sensor_.camera.width, sensor_.camera.height,
+                seed + 1),
       trainer_(gpu),
       renderer_(std::move(gpu)) {
   model_.set_sh_degree(options.sh_degree);
@@ -186,7 +194,7 @@ void PhotorealisticMapper::keep_image_budget() {
 
 void PhotorealisticMapper::set_images(const ImageU8& color, const ImageU16& depth, TrainingView& view) const {
   const CameraView full{sensor_.camera, color, depth, sensor_.mask};
-  for (int level = 0; level <= options_.schedule.pyramid_levels; ++level) {
+  for (int level = 0; level <= schedule_.coarsest_level(); ++level) {
     const CameraView small = level == 0 ? full : shrink(full, 1 << level);
     view.cameras.push_back(small.camera);
     splatting::TargetImage& target =
@@ -200,8 +208,8 @@ void PhotorealisticMapper::seed_keyframe(const MapSnapshot& map, size_t view, Ex
   DepthPicture& picture = views_[view].picture;
   if (picture.depth.empty() && options_.depth.enabled) sweep_picture(map, view, executor);
   const Keyframe& keyframe = map.keyframe(KeyframeId(static_cast<int32_t>(view))).keyframe;
-  const auto features = feature_depths(options_.feature_depth, map, keyframe, picture, kSeedingFactor);
-  seed(view, options_.seeding.cell_px, options_.seeding.min_color_error, features, executor);
+  newest_features_ = feature_depths(options_.feature_depth, map, keyframe, picture, kSeedingFactor);
+  seed(view, options_.seeding.cell_px, options_.seeding.min_color_error, newest_features_, executor);
 }
 
 void PhotorealisticMapper::sweep_picture(const MapSnapshot& map, size_t index, Executor& executor) {
@@ -353,11 +361,12 @@ void PhotorealisticMapper::maintain(std::optional<double> progress, Executor& ex
   prune(options_.densification, scene_depth_, model_);
 }
 
-KeyframeComparison PhotorealisticMapper::compare(size_t keyframe, Executor& executor) {
-  PHOTOSLAM_CHECK(keyframe < views_.size(), "keyframe {} of {}", keyframe, views_.size());
-  render_picture(keyframe, executor);
-  apply(views_[keyframe].exposure.exposure(), render_);
-  return {to_rgb(views_[keyframe].picture.color), to_u8(to_image(render_))};
+KeyframeComparison PhotorealisticMapper::compare_newest(Executor& executor) {
+  PHOTOSLAM_CHECK(has_keyframes(), "a comparison needs a keyframe");
+  const size_t newest = views_.size() - 1;
+  render_picture(newest, executor);
+  apply(views_[newest].exposure.exposure(), render_);
+  return {to_rgb(views_[newest].picture.color), to_u8(to_image(render_)), newest_features_};
 }
 
 FrozenMap PhotorealisticMapper::freeze() const {

@@ -75,10 +75,11 @@ struct FrozenMap {
   std::vector<splatting::Exposure> keyframe_exposures;  ///< [K] What makes renders as bright as the pictures.
 };
 
-/// A picture and the render of the same view, both RGB.
+/// A keyframe at half its size.
 struct KeyframeComparison {
-  ImageU8 picture;
-  ImageU8 render;
+  ImageU8 picture;                   ///< RGB
+  ImageU8 render;                    ///< RGB, what the map shows there now.
+  std::vector<DepthPixel> features;  ///< Of the keyframe, in pixels of the full picture.
 };
 
 /// Photorealistic mapping (paper, Sec. 3.3 and 3.4): trains the gaussians of the hyper primitives map on keyframe
@@ -109,8 +110,8 @@ class PhotorealisticMapper {
   /// refinement is done; empty while frames arrive.
   splatting::StepResult train(std::optional<double> progress, Executor& executor);
 
-  /// The picture of a keyframe that still has one, at half the size, and what the map shows there now.
-  KeyframeComparison compare(size_t keyframe, Executor& executor);
+  /// There must be a keyframe.
+  KeyframeComparison compare_newest(Executor& executor);
 
   /// Whether the next iterations go to keyframes where a correction of the map left seams.
   bool has_seams() const { return schedule_.is_revisiting(); }
@@ -167,6 +168,7 @@ class PhotorealisticMapper {
   std::vector<SE3> anchors_from_world_;
   std::vector<double> anchor_scales_;  // Keyframe::scale as taken over last
   std::vector<TrainingView> views_;
+  std::vector<DepthPixel> newest_features_;  // of the keyframe seeded last
   int num_corrections_ = 0;   // of the map, as taken over last
   double scene_depth_ = 1.0;  // median over keyframes of their median depth [m]
   int iteration_ = 0;
