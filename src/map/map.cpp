@@ -103,7 +103,7 @@ void Map::erase_landmark(LandmarkId id) {
   for (const auto& [keyframe, keypoint] : landmark.observations) {
     mutable_keyframe(keyframe).landmarks[static_cast<size_t>(keypoint)] = LandmarkId{};
   }
-  landmark.observations.clear();
+  landmark.observations = std::vector<LandmarkObservation>();  // gives the memory back
   landmark.view.alive = false;
 }
 
@@ -170,6 +170,7 @@ void Map::cull_keyframe(KeyframeId id) {
   without_features->frame = culled.frame->frame;
   without_features->timestamp_ns = culled.frame->timestamp_ns;
   culled.frame = std::move(without_features);
+  culled.landmarks = std::vector<LandmarkId>();
   culled.culled = true;
 
   tie(id, culled.parent);

@@ -14,6 +14,12 @@ namespace {
 
 using splatting::Gaussian;
 
+constexpr float kMinViews = 3;  // that must have judged a gaussian
+
+bool is_idle(const DensificationOptions& options, const splatting::Statistics& statistics) {
+  return statistics.visible >= kMinViews && static_cast<double>(statistics.max_weight) < options.min_weight;
+}
+
 double largest_scale(const Gaussian& g) {
   return std::exp(static_cast<double>(std::max({g.log_scale[0], g.log_scale[1], g.log_scale[2]})));
 }
@@ -63,7 +69,7 @@ DensificationCounts densify(const DensificationOptions& options, double scene_de
       static_cast<size_t>(options.max_gaussians) - std::min(model.size(), static_cast<size_t>(options.max_gaussians));
   model.for_each([&](size_t index) {
     const splatting::Statistics statistics = model.statistics(index);
-    if (statistics.visible >= 3 && static_cast<double>(statistics.max_weight) < options.min_weight) {
+    if (is_idle(options, statistics)) {
       remove[index] = 1;
       ++counts.pruned;
       return;
@@ -89,8 +95,13 @@ DensificationCounts densify(const DensificationOptions& options, double scene_de
   return counts;
 }
 
+size_t prune_idle(const DensificationOptions& options, splatting::GaussianModel& model) {
+  const size_t removed = model.remove_if([&](size_t index) { return is_idle(options, model.statistics(index)); });
+  model.reset_statistics();
+  return removed;
+}
+
 size_t make_room(const DensificationOptions& options, size_t newcomers, splatting::GaussianModel& model) {
-  constexpr float kMinViews = 3;
   const auto limit = static_cast<size_t>(options.max_gaussians);
   if (model.size() + newcomers <= limit) return 0;
   std::vector<std::pair<float, size_t>> order;  // mean weight in a view, index

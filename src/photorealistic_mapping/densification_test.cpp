@@ -79,6 +79,14 @@ TEST_F(DensificationTest, GaussiansThatNeverMatterAreRemoved) {
   EXPECT_EQ(model.size(), 1u);
 }
 
+TEST_F(DensificationTest, PruningTheIdleLooksAtOnePeriodAfterTheOther) {
+  add(gaussian(0.01f), 0, static_cast<float>(0.5 * options.min_weight));
+  add(gaussian(0.01f), 0);
+  EXPECT_EQ(prune_idle(options, model), 1u);
+  EXPECT_EQ(prune_idle(options, model), 0u) << "nobody has looked since";
+  EXPECT_EQ(model.size(), 1u);
+}
+
 TEST_F(DensificationTest, PruningRemovesTransparentHugeAndBrokenOnes) {
   Gaussian broken = gaussian(0.01f);
   broken.mean[1] = std::numeric_limits<float>::quiet_NaN();

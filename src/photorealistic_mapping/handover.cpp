@@ -28,6 +28,12 @@ struct Arrival {
   uint32_t tag, birth;
 };
 
+/// The leaving ones go from where they were.
+void move(std::span<const uint8_t> leaves, std::span<const Arrival> arrivals, splatting::GaussianModel& model) {
+  model.remove(leaves);
+  for (const Arrival& arrival : arrivals) model.add(arrival.anchor, {&arrival.gaussian, 1}, arrival.tag, arrival.birth);
+}
+
 }  // namespace
 
 void LastViewers::show(int keyframe, const PinholeCamera& camera, std::span<const splatting::Pose> camera_from_anchor,
@@ -72,9 +78,24 @@ size_t hand_over(double min_shift_px, const PinholeCamera& camera, std::span<con
         {viewers[i], transform(g, passage->second.pose, passage->second.rotation), model.tag(i), model.birth(i)});
     leaves[i] = 1;
   });
-  if (arrivals.empty()) return 0;
-  model.remove(leaves);
-  for (const Arrival& arrival : arrivals) model.add(arrival.anchor, {&arrival.gaussian, 1}, arrival.tag, arrival.birth);
+  if (!arrivals.empty()) move(leaves, arrivals, model);
+  return arrivals.size();
+}
+
+size_t adopt(std::span<const Adoption> adoptions, splatting::GaussianModel& model) {
+  if (adoptions.empty()) return 0;
+  std::map<int, std::pair<int, Passage>> passages;  // by the anchor that gives
+  for (const Adoption& a : adoptions) passages.try_emplace(a.from, a.to, Passage(a.to_from_from));
+  std::vector<Arrival> arrivals;
+  std::vector<uint8_t> leaves(model.index_end(), 0);
+  model.for_each([&](size_t i) {
+    const auto found = passages.find(model.anchor(i));
+    if (found == passages.end()) return;
+    const auto& [to, passage] = found->second;
+    arrivals.push_back({to, transform(model.get(i), passage.pose, passage.rotation), model.tag(i), model.birth(i)});
+    leaves[i] = 1;
+  });
+  if (!arrivals.empty()) move(leaves, arrivals, model);
   return arrivals.size();
 }
 

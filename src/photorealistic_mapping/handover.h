@@ -41,4 +41,13 @@ class LastViewers {
 size_t hand_over(double min_shift_px, const PinholeCamera& camera, std::span<const Sim3> before,
                  std::span<const Sim3> after, const LastViewers& viewers, splatting::GaussianModel& model);
 
+/// One anchor takes over all that another has.
+struct Adoption {
+  int from, to;
+  SE3 to_from_from;  ///< In present units.
+};
+
+/// Gaussians stay where they are in the world; their optimiser state starts anew. Returns how many changed hands.
+size_t adopt(std::span<const Adoption> adoptions, splatting::GaussianModel& model);
+
 }  // namespace photoslam

@@ -105,5 +105,18 @@ TEST_F(Handover, ScalesChangeThePlaceButNotTheLook) {
   for (size_t i = 0; i < was.size(); ++i) ASSERT_NEAR(is[i], was[i], 5e-3) << i;  // means are fp32, and order ties
 }
 
+TEST_F(Handover, AdoptedGaussiansStayInTheWorld) {
+  const size_t all = model.size();
+  const std::vector<float> was = render(poses(0, before)).depth;
+  const SE3 to_from_from = before[1].rigid() * before[0].rigid().inverse();
+  EXPECT_EQ(adopt(std::vector{Adoption{0, 1, to_from_from}}, model), all);
+  EXPECT_EQ(model.size(0), 0u);
+  EXPECT_EQ(model.size(1), all);
+  const std::vector<float> is = render(poses(0, before)).depth;
+  ASSERT_EQ(is.size(), was.size());
+  // Rounding may carry a splat across the cut-off at alpha = 1/255, no farther away than 4 m.
+  for (size_t i = 0; i < is.size(); ++i) ASSERT_NEAR(is[i], was[i], 4.1 / 255) << i;
+}
+
 }  // namespace
 }  // namespace photoslam

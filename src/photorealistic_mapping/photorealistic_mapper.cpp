@@ -116,7 +116,24 @@ void PhotorealisticMapper::update_poses(const MapSnapshot& map) {
     anchor_scales_[i] = keyframe.scale;
   }
   merge_doubled(options_.doubling, before, after, seams, model_);
+  release_culled(map);
   schedule_.revisit(seams);
+}
+
+/// What would grow with every lap: pictures of places that newer keyframes show as well, and blocks of few gaussians.
+/// The next keyframe may still need the picture of the newest one.
+void PhotorealisticMapper::release_culled(const MapSnapshot& map) {
+  std::vector<Adoption> adoptions;
+  for (size_t i = 0; i + 1 < views_.size(); ++i) {
+    const Keyframe& keyframe = map.keyframe(KeyframeId(static_cast<int32_t>(i))).keyframe;
+    if (!keyframe.culled) continue;
+    if (views_[i].has_images()) retire(i);
+    const auto child = static_cast<int>(i), parent = keyframe.parent.value;
+    if (model_.size(child) == 0) continue;
+    const SE3& parent_from_world = anchors_from_world_[static_cast<size_t>(parent)];
+    adoptions.push_back({child, parent, parent_from_world * anchors_from_world_[i].inverse()});
+  }
+  adopt(adoptions, model_);
 }
 
 /// Before a correction: what keyframes at the seams show goes with them.
@@ -180,6 +197,11 @@ void PhotorealisticMapper::TrainingView::drop_images() {
   right = {};
 }
 
+void PhotorealisticMapper::retire(size_t view) {
+  schedule_.retire(static_cast<int>(view));
+  views_[view].drop_images();
+}
+
 /// The newest keyframe's pictures stay: the next one's depth may need them.
 void PhotorealisticMapper::keep_image_budget() {
   const double fitting = options_.image_budget_mb / std::max(views_.back().megabytes(), 1e-6);
@@ -187,8 +209,7 @@ void PhotorealisticMapper::keep_image_budget() {
     std::vector<SE3> poses;
     for (const int view : schedule_.active()) poses.push_back(view_from_world(static_cast<size_t>(view)));
     const int dispensable = schedule_.active()[most_redundant_view(poses, scene_depth_)];
-    schedule_.retire(dispensable);
-    views_[static_cast<size_t>(dispensable)].drop_images();
+    retire(static_cast<size_t>(dispensable));
   }
 }
 
@@ -355,8 +376,12 @@ void PhotorealisticMapper::maintain(std::optional<double> progress, Executor& ex
     seed(static_cast<size_t>(view), options_.seeding.cell_px / 2, options_.reseed_color_error, {}, executor);
   }
   if (iteration_ % options_.densification.interval != 0) return;
-  if (growing && progress && options_.densification.enabled) {
-    densify(options_.densification, scene_depth_, random_, model_);
+  if (progress && options_.densification.enabled) {
+    if (growing) {
+      densify(options_.densification, scene_depth_, random_, model_);
+    } else {
+      prune_idle(options_.densification, model_);
+    }
   }
   prune(options_.densification, scene_depth_, model_);
 }

@@ -92,7 +92,8 @@ class PhotorealisticMapper {
                        std::shared_ptr<splatting::Gpu> gpu = nullptr);
 
   /// Takes over the poses of all keyframes, and with them moves the gaussians. Where a keyframe's scale has changed,
-  /// all that is measured in its frame grows with it.
+  /// all that is measured in its frame grows with it. Keyframes that geometry mapping has culled, because others see what
+  /// they see, give their gaussians to their parents, and their pictures are forgotten.
   void update_poses(const MapSnapshot& map);
 
   /// Starts training on the next keyframe (by id) and seeds the part of its image that the map does not explain. An
@@ -146,6 +147,8 @@ class PhotorealisticMapper {
   splatting::RenderOptions render_options() const;
   splatting::TrainOptions train_options(std::optional<double> progress) const;
   void set_images(const ImageU8& color, const ImageU16& depth, TrainingView& view) const;
+  void retire(size_t view);
+  void release_culled(const MapSnapshot& map);
   void keep_image_budget();
   void serialize_view(Archive& archive, TrainingView* view);
   void hand_over_at(std::span<const int> seams, std::span<const Sim3> before, std::span<const Sim3> after);

@@ -216,8 +216,8 @@ TEST_F(PhotorealisticMapperTest, ASimilarityOfMapAndCamerasLeavesEveryImageTheSa
     for (const SE3& camera : cameras) {
       const SE3 moved = (Sim3(camera) * total.inverse()).rigid();
       const auto a = render(before, camera, executor_), b = render(after, moved, executor_);
-      // Rounding may carry a splat across the cut-off at alpha = 1/255, or past another that is equally far, which shows
-      // in some pixels.
+      // Rounding may carry a splat across the cut-off at alpha = 1/255, or past another that is equally far, which
+      // shows in some pixels.
       size_t crossed = 0;
       for (size_t i = 0; i < a.size(); ++i) {
         ASSERT_LT(std::abs(a[i] - b[i]), 1.0f / 255) << i;
