@@ -14,6 +14,7 @@
 #include "image_size.h"
 #include "interrupt.h"
 #include "sources/sensor_choice.h"
+#include "sources/synthetic/camera_path.h"
 #include "sources/synthetic/mesh_world.h"
 #include "sources/synthetic/sequence_writer.h"
 
@@ -106,22 +107,40 @@ Status configure(SynthArguments& arguments, SequenceSettings& settings) {
   return check_sequence_folder(arguments.output);
 }
 
-/// The world to film: one of ours by its name, or a user's mesh with a walk of its own.
-Result<std::shared_ptr<const SyntheticWorld>> build_world(SynthArguments& arguments, Executor& executor) {
-  SyntheticOptions& options = arguments.options;
-  if (is_world_name(arguments.scene)) {
-    if (options.num_frames == 0) options.num_frames = kDefaultFrames;
-    return make_world(arguments.scene, static_cast<uint64_t>(options.seed), executor);
-  }
-  auto mesh = open_mesh_world(arguments.scene, arguments.trajectory, executor);
-  if (!mesh) return mesh.error();
-  const int whole = static_cast<int>(mesh->seconds * options.frames_per_second) + 1;
+/// What to film and along which path; without a path along the world's own.
+struct Scene {
+  std::shared_ptr<const SyntheticWorld> world;
+  std::unique_ptr<const CameraPath> path;
+};
+
+/// As many frames as the walk has, or as many of them as are wanted.
+Status choose_frames(const SynthArguments& arguments, double seconds, SyntheticOptions& options) {
+  const int whole = static_cast<int>(seconds * options.frames_per_second) + 1;
   if (options.num_frames == 0) options.num_frames = whole;
-  if (options.num_frames > whole) {
-    return error("--frames {}: {} has poses for {} frames at {} Hz", options.num_frames, arguments.trajectory.string(),
-                 whole, options.frames_per_second);
+  if (options.num_frames <= whole) return {};
+  return error("--frames {}: {} has poses for {} frames at {} Hz", options.num_frames, arguments.trajectory.string(),
+               whole, options.frames_per_second);
+}
+
+/// One of our worlds by its name, or a user's mesh.
+Result<Scene> build_scene(SynthArguments& arguments, Executor& executor) {
+  SyntheticOptions& options = arguments.options;
+  if (!is_world_name(arguments.scene)) {
+    auto mesh = open_mesh_world(arguments.scene, arguments.trajectory, executor);
+    if (!mesh) return mesh.error();
+    if (Status status = choose_frames(arguments, mesh->seconds, options); !status) return status.error();
+    return Scene{mesh->world, nullptr};
   }
-  return mesh->world;
+  std::unique_ptr<const RecordedPath> path;
+  if (!arguments.trajectory.empty()) {
+    auto poses = read_walk(arguments.trajectory);
+    if (!poses) return poses.error();
+    path = std::make_unique<const RecordedPath>(std::move(*poses));
+    if (Status status = choose_frames(arguments, path->seconds(), options); !status) return status.error();
+  } else if (options.num_frames == 0) {
+    options.num_frames = kDefaultFrames;
+  }
+  return Scene{make_world(arguments.scene, static_cast<uint64_t>(options.seed), executor), std::move(path)};
 }
 
 Status synthesize(SynthArguments arguments) {
@@ -132,13 +151,13 @@ Status synthesize(SynthArguments arguments) {
   const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   ThreadPool executor(arguments.threads > 0 ? arguments.threads : cores);
   fmt::print(stderr, "building {}\n", arguments.scene);
-  const auto world = build_world(arguments, executor);
-  if (!world) return world.error();
+  auto scene = build_scene(arguments, executor);
+  if (!scene) return scene.error();
   fmt::print(stderr, "filming {} frames into {}\n", arguments.options.num_frames, arguments.output.string());
 
   FrameCounter counter(arguments.options.num_frames);
   const auto summary = write_sequence(
-      SyntheticCamera(*world, arguments.options), settings, arguments.output, executor,
+      SyntheticCamera(scene->world, arguments.options, std::move(scene->path)), settings, arguments.output, executor,
       [&](int done) { counter.show(done); }, interrupt.token());
   if (!summary) return summary.error();
   fmt::print("{} frames in {:.1f} s: {}\n", summary->frames, total.seconds(), arguments.output.string());
@@ -151,11 +170,7 @@ Status synthesize(SynthArguments arguments) {
 
 /// A world's name, or a mesh with a walk.
 void check_scene(const SynthArguments& arguments) {
-  if (is_world_name(arguments.scene)) {
-    if (!arguments.trajectory.empty())
-      throw CLI::ValidationError("--trajectory", "needs a mesh: the built-in worlds have walks of their own");
-    return;
-  }
+  if (is_world_name(arguments.scene)) return;
   std::vector<std::string> names;
   for (const WorldInfo& world : synthetic_worlds()) names.push_back(world.name);
   if (!std::filesystem::is_regular_file(arguments.scene))
@@ -174,6 +189,7 @@ void add_synth(CommandLine& line) {
                                "  photoslam synth room --frames 900 --format replica --output room900\n"
                                "  photoslam synth room --sensor stereo --lens radial --output room_stereo\n"
                                "  photoslam synth room --noise 0 --depth-noise 0 --depth-holes 0 --output clean\n"
+                               "  photoslam synth house --trajectory walk.txt --output another_walk\n"
                                "  photoslam synth scan.ply --trajectory walk.txt --output scan_walk\n");
   SynthArguments& a = *arguments;
   SyntheticOptions& o = a.options;
@@ -182,7 +198,8 @@ void add_synth(CommandLine& line) {
   scenes += " or a mesh of yours (.ply or .obj, with colours at its vertices or in images)";
   command.add_option("scene", a.scene, scenes)->required();
   command
-      .add_option("--trajectory", a.trajectory, "Walk through the mesh: poses of the camera in its frame (TUM file)")
+      .add_option("--trajectory", a.trajectory,
+                  "Walk of yours: poses of the camera in the frame of the scene (TUM file); a mesh needs one")
       ->check(CLI::ExistingFile);
   command.add_option("--sensor", a.sensor, "Sensor of the camera")
       ->check(CLI::IsMember({"rgbd", "stereo", "mono"}))
@@ -196,7 +213,7 @@ void add_synth(CommandLine& line) {
       .add_option(
           "--frames", o.num_frames,
           fmt::format("Length; in the room 300 are the first loop and 900 the whole tour. Without it {}, or the "
-                      "whole walk through a mesh",
+                      "whole walk of yours",
                       kDefaultFrames))
       ->check(CLI::Range(1, 1000000));
   command.add_option("--shrink", a.shrink, "Images smaller by this factor: 2 is 320x240")

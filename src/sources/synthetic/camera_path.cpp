@@ -100,6 +100,12 @@ SE3 RecordedPath::world_from_camera(double seconds) const {
           (1 - t) * a.world_from_camera.translation + t * b.world_from_camera.translation};
 }
 
+Result<Trajectory> read_walk(const std::filesystem::path& tum_file) {
+  Result<Trajectory> poses = read_tum_trajectory(tum_file);
+  if (poses && poses->empty()) return error("{}: has no poses; a walk needs at least one", tum_file.string());
+  return poses;
+}
+
 std::vector<Waypoint> walk_along(const std::vector<Vec2>& corners, double radius, double spacing, double ahead,
                                  double eye_height) {
   // A dense polyline with arcs for corners, then points at equal lengths along it.

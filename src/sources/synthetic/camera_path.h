@@ -3,8 +3,10 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <vector>
 
+#include "base/result.h"
 #include "io/trajectory_file.h"
 #include "math/se3.h"
 
@@ -52,6 +54,9 @@ class RecordedPath final : public CameraPath {
  private:
   Trajectory poses_;
 };
+
+/// The poses of a RecordedPath from a TUM file; an error where there are none.
+Result<Trajectory> read_walk(const std::filesystem::path& tum_file);
 
 /// Waypoints at eye height along a closed polyline whose corners are rounded, `spacing` apart [m], looking at the point
 /// `ahead` metres further along.

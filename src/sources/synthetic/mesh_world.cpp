@@ -80,9 +80,8 @@ Result<SceneModel> scene_of(const MeshFile& file, Executor& executor) {
 
 Result<MeshWorld> open_mesh_world(const std::filesystem::path& mesh, const std::filesystem::path& trajectory,
                                   Executor& executor) {
-  Result<Trajectory> poses = read_tum_trajectory(trajectory);
+  Result<Trajectory> poses = read_walk(trajectory);
   if (!poses) return poses.error();
-  if (poses->empty()) return error("{}: has no poses; a walk needs at least one", trajectory.string());
   const Result<MeshFile> file = read_mesh(mesh);
   if (!file) return file.error();
   Result<SceneModel> model = scene_of(*file, executor);

@@ -12,10 +12,11 @@
 
 namespace photoslam {
 
-SyntheticCamera::SyntheticCamera(std::shared_ptr<const SyntheticWorld> world, const SyntheticOptions& options)
+SyntheticCamera::SyntheticCamera(std::shared_ptr<const SyntheticWorld> world, const SyntheticOptions& options,
+                                 std::unique_ptr<const CameraPath> path)
     : world_(std::move(world)),
       options_(options),
-      path_(world_->path(static_cast<uint64_t>(options.seed), options.seconds_per_lap)),
+      path_(path ? std::move(path) : world_->path(static_cast<uint64_t>(options.seed), options.seconds_per_lap)),
       rays_(options.camera, options.distortion),
       right_(right_camera(options)) {
   PHOTOSLAM_CHECK(options.frames_per_second > 0, "{} Hz", options.frames_per_second);

@@ -17,8 +17,10 @@ namespace photoslam {
 /// Films a synthetic world frame by frame; any frame can be made on its own, from any thread.
 class SyntheticCamera {
  public:
-  /// The world is shared, not copied. It should have been built with the same seed.
-  SyntheticCamera(std::shared_ptr<const SyntheticWorld> world, const SyntheticOptions& options);
+  /// The world is shared, not copied. It should have been built with the same seed. Without a path the camera takes the
+  /// world's own walk.
+  SyntheticCamera(std::shared_ptr<const SyntheticWorld> world, const SyntheticOptions& options,
+                  std::unique_ptr<const CameraPath> path = nullptr);
 
   const SyntheticOptions& options() const { return options_; }
   /// index / frames_per_second, rounded down to nanoseconds: the middle of the exposure of the middle row.

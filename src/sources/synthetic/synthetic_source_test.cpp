@@ -59,6 +59,20 @@ TEST(SyntheticSource, DeliversTheSameFramesAtAnyThreadCount) {
   EXPECT_FALSE(one.next().has_value());
 }
 
+TEST(SyntheticSource, FilmsAlongAGivenPathToo) {
+  ThreadPool pool(2);
+  const SyntheticOptions options = small_options();
+  const auto room = draft_room(pool);
+  const SyntheticCamera usual(room, options);
+  // The end of the usual walk, from its third frame on.
+  Trajectory poses = usual.ground_truth();
+  poses.erase(poses.begin(), poses.begin() + 2);
+  const SyntheticCamera given(room, options, std::make_unique<RecordedPath>(poses));
+  EXPECT_EQ(given.world_from_camera(0).matrix(), usual.world_from_camera(2).matrix());
+  EXPECT_EQ(given.view(0, pool).radiance, usual.view(2, pool).radiance);
+  EXPECT_EQ(given.world_from_camera(4).matrix(), usual.world_from_camera(4).matrix()) << "rests at its end";
+}
+
 class SequenceWriterTest : public TempFolderTest {
  protected:
   /// Reads a written sequence with the reader of real ones and compares it with the frames themselves.
