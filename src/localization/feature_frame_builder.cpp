@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+
+#include "math/median.h"
 
 namespace photoslam {
 
@@ -12,7 +15,8 @@ void DepthOptions::visit(OptionVisitor& v) {
           virtual_baseline_m);
   v.value({"min_m", "m", 0.0, 10.0, "Depth below this counts as missing."}, min_m);
   v.value({"max_m", "m", 0.5, 1000.0, "Depth above this counts as missing."}, max_m);
-  v.value({"max_edge_ratio", "", 0.0, 1.0, "Relative depth step in a 3x3 patch above which a keypoint has no depth."},
+  v.value({"max_edge_ratio", "", 0.0, 1.0,
+           "Relative depth step in a 3x3 patch above which a keypoint has no depth, if noise does not explain it."},
           max_edge_ratio);
 }
 
@@ -25,25 +29,47 @@ FeatureFrameBuilder::FeatureFrameBuilder(const OrbOptions& orb, const DepthOptio
       extractor_(orb),
       stereo_matcher_(stereo) {}
 
-float FeatureFrameBuilder::depth_at(const ImageU16& depth, const Keypoint& keypoint) const {
+/// σ of the depth at 1 m [m], taken to grow with the square of the depth: from second differences along rows, which
+/// slanted surfaces do not have. By their median, so that edges do not count.
+double FeatureFrameBuilder::depth_noise(const ImageU16& depth) {
+  constexpr int kStride = 8;
+  second_differences_.clear();
+  for (int y = kStride / 2; y < depth.height(); y += kStride) {
+    for (int x = kStride / 2; x < depth.width() - 1; x += kStride) {
+      const int left = depth(x - 1, y), centre = depth(x, y), right = depth(x + 1, y);
+      if (left == 0 || centre == 0 || right == 0) continue;
+      const double metres = centre * sensor_.metres_per_unit;
+      second_differences_.push_back(std::abs(left - 2 * centre + right) * sensor_.metres_per_unit / (metres * metres));
+    }
+  }
+  if (second_differences_.empty()) return 0;
+  constexpr double kSigmaOfMedian = 1 / 0.6745;
+  return kSigmaOfMedian * lower_median(second_differences_) / std::sqrt(6.0);
+}
+
+/// Where the 3x3 patch has a hole or a step that is more than noise there is no depth.
+float FeatureFrameBuilder::depth_at(const ImageU16& depth, double noise, const Keypoint& keypoint) const {
   const int x = static_cast<int>(std::lround(keypoint.x));
   const int y = static_cast<int>(std::lround(keypoint.y));
   if (x < 1 || y < 1 || x >= depth.width() - 1 || y >= depth.height() - 1) return 0.0f;
   const double centre = depth(x, y) * sensor_.metres_per_unit;
   if (centre < depth_options_.min_m || centre > depth_options_.max_m) return 0.0f;
+  constexpr double kMaxSigma = 3.5 * std::numbers::sqrt2;  // of the difference of two measurements
+  const double max_step = std::max(depth_options_.max_edge_ratio * centre, kMaxSigma * noise * centre * centre);
   for (int dy = -1; dy <= 1; ++dy) {
     for (int dx = -1; dx <= 1; ++dx) {
       const double neighbour = depth(x + dx, y + dy) * sensor_.metres_per_unit;
-      if (std::abs(neighbour - centre) > depth_options_.max_edge_ratio * centre) return 0.0f;
+      if (!(neighbour > 0) || std::abs(neighbour - centre) > max_step) return 0.0f;
     }
   }
   return static_cast<float>(centre);
 }
 
-void FeatureFrameBuilder::add_measured_depth(const ImageU16& depth, FeatureFrame& frame) const {
+void FeatureFrameBuilder::add_measured_depth(const ImageU16& depth, FeatureFrame& frame) {
+  const double noise = depth_noise(depth);
   for (size_t i = 0; i < frame.size(); ++i) {
     const Keypoint& keypoint = frame.features.keypoints[i];
-    frame.depth[i] = depth_at(depth, keypoint);
+    frame.depth[i] = depth_at(depth, noise, keypoint);
     if (frame.depth[i] > 0) frame.observations[i].u_right = keypoint.x - bf_ / static_cast<double>(frame.depth[i]);
   }
 }

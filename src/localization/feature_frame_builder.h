@@ -41,8 +41,9 @@ class FeatureFrameBuilder {
                                             const ImageU16& depth, const ImageU8& right = {});
 
  private:
-  float depth_at(const ImageU16& depth, const Keypoint& keypoint) const;
-  void add_measured_depth(const ImageU16& depth, FeatureFrame& frame) const;
+  double depth_noise(const ImageU16& depth);
+  float depth_at(const ImageU16& depth, double noise, const Keypoint& keypoint) const;
+  void add_measured_depth(const ImageU16& depth, FeatureFrame& frame);
   void add_stereo_depth(const ImageU8& right, FeatureFrame& frame);
 
   OrbOptions orb_options_;
@@ -53,6 +54,7 @@ class FeatureFrameBuilder {
   GreyPyramid right_pyramid_;
   StereoMatcher stereo_matcher_;
   std::vector<float> disparity_;
+  std::vector<double> second_differences_;
 };
 
 }  // namespace photoslam
