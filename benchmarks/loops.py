@@ -4,7 +4,7 @@
 """Loops on rendered sequences: are they found, what do they mend, and is nothing found where there is none?
 
 Usage: benchmarks/loops.py build/release/photoslam SCRATCH [--seeds 10] [--worlds house,corridors,doors]
-                           [--sensors rgbd,stereo,mono] [--keep]
+                           [--sensors rgbd,stereo,mono] [--noise 4] [--depth-noise 0.004] [--baseline 0.11] [--keep]
 
 For every seed another world is built, filmed with noise, and walked once and a little further; every sequence is run
 twice in deterministic mode, with and without closing loops. The gap is the error of the vector from the first to the
@@ -21,7 +21,7 @@ import sys
 
 FRAMES_PER_SECOND = 10
 FRAMES = {"house": 235, "corridors": 780, "doors": 700}
-NOISE = ["--shrink", "2", "--fps", str(FRAMES_PER_SECOND), "--noise", "4", "--depth-noise", "0.004"]
+SIZE = ["--shrink", "2", "--fps", str(FRAMES_PER_SECOND)]
 NO_GAUSSIANS = ["--iterations-per-frame", "0", "--set", "photorealistic_mapping.depth.enabled=false", "--set",
                 "photorealistic_mapping.densification.max_gaussians=100", "--no-session"]
 # At 10 Hz; the default of three frames is meant for 30 Hz.
@@ -29,12 +29,12 @@ LAG = ["--set", "pipeline.keyframe_lag_frames=1"]
 OPEN = ["--set", "loop_closure.enabled=false"]
 
 
-def film(program: str, world: str, sensor: str, seed: int, scratch: pathlib.Path) -> pathlib.Path:
+def film(program: str, world: str, sensor: str, seed: int, noise: list[str], scratch: pathlib.Path) -> pathlib.Path:
     """One RGB-D sequence serves the single camera too."""
     folder = scratch / f"{world}_{'stereo' if sensor == 'stereo' else 'rgbd'}_{seed}"
     if not folder.exists():
         subprocess.run([program, "synth", world, "--sensor", "stereo" if sensor == "stereo" else "rgbd", "--frames",
-                        str(FRAMES[world]), "--seed", str(seed), *NOISE, "--format",
+                        str(FRAMES[world]), "--seed", str(seed), *SIZE, *noise, "--format",
                         "kitti" if sensor == "stereo" else "tum", "--output", str(folder)],
                        check=True, capture_output=True)
     return folder
@@ -116,14 +116,18 @@ def main() -> int:
     parser.add_argument("--first-seed", type=int, default=1)
     parser.add_argument("--worlds", default="house,corridors,doors")
     parser.add_argument("--sensors", default="rgbd,stereo,mono")
+    parser.add_argument("--noise", default="4", help="of the images [grey levels]")
+    parser.add_argument("--depth-noise", default="0.004", help="of the depth at 1 m [m]")
+    parser.add_argument("--baseline", default="0.11", help="of the stereo rig [m]")
     parser.add_argument("--keep", action="store_true", help="leave the sequences in SCRATCH")
     arguments = parser.parse_args()
     arguments.scratch.mkdir(parents=True, exist_ok=True)
     sensors = arguments.sensors.split(",")
+    noise = ["--noise", arguments.noise, "--depth-noise", arguments.depth_noise, "--baseline", arguments.baseline]
     for world in arguments.worlds.split(","):
         for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds):
             for sensor in sensors:
-                sequence = film(arguments.program, world, sensor, seed, arguments.scratch)
+                sequence = film(arguments.program, world, sensor, seed, noise, arguments.scratch)
                 closed = run(arguments.program, sequence, sensor, [], arguments.scratch / "out")
                 print(f"{world:9} {sensor:6} seed {seed:2}  closing  {line(closed)}", flush=True)
                 if world == "doors":
