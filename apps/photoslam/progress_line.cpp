@@ -15,8 +15,8 @@ constexpr double kRewriteInterval_s = 0.1;  // on a terminal
 constexpr double kLineInterval_s = 2.0;     // elsewhere
 
 std::string describe(const Progress& p) {
-  const std::string map = fmt::format("{} keyframes, {} gaussians, {} iterations, PSNR {:.1f} dB", p.keyframes,
-                                      p.gaussians, p.iterations, p.training_psnr_db);
+  std::string map = fmt::format("{} keyframes, {} gaussians", p.keyframes, p.gaussians);
+  if (p.iterations > 0) map += fmt::format(", {} iterations, PSNR {:.1f} dB", p.iterations, p.training_psnr_db);
   switch (p.phase) {
     case Progress::Phase::refining:
       return fmt::format("refining {:3.0f} %: {}", 100 * p.refined, map);
