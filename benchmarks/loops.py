@@ -4,7 +4,8 @@
 """Loops on rendered sequences: are they found, what do they mend, and is nothing found where there is none?
 
 Usage: benchmarks/loops.py build/release/photoslam SCRATCH [--seeds 10] [--worlds house,corridors,doors]
-                           [--sensors rgbd,stereo,mono] [--noise 4] [--depth-noise 0.004] [--baseline 0.11] [--keep]
+                           [--sensors rgbd,stereo,mono] [--noise 4] [--depth-noise 0.004] [--baseline 0.11]
+                           [--set KEY=VALUE] [--keep]
 
 For every seed another world is built, filmed with noise, and walked once and a little further; every sequence is run
 twice in deterministic mode, with and without closing loops. The gap is the error of the vector from the first to the
@@ -119,20 +120,22 @@ def main() -> int:
     parser.add_argument("--noise", default="4", help="of the images [grey levels]")
     parser.add_argument("--depth-noise", default="0.004", help="of the depth at 1 m [m]")
     parser.add_argument("--baseline", default="0.11", help="of the stereo rig [m]")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="configuration of the program")
     parser.add_argument("--keep", action="store_true", help="leave the sequences in SCRATCH")
     arguments = parser.parse_args()
     arguments.scratch.mkdir(parents=True, exist_ok=True)
     sensors = arguments.sensors.split(",")
+    settings = [word for setting in arguments.set for word in ("--set", setting)]
     noise = ["--noise", arguments.noise, "--depth-noise", arguments.depth_noise, "--baseline", arguments.baseline]
     for world in arguments.worlds.split(","):
         for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds):
             for sensor in sensors:
                 sequence = film(arguments.program, world, sensor, seed, noise, arguments.scratch)
-                closed = run(arguments.program, sequence, sensor, [], arguments.scratch / "out")
+                closed = run(arguments.program, sequence, sensor, settings, arguments.scratch / "out")
                 print(f"{world:9} {sensor:6} seed {seed:2}  closing  {line(closed)}", flush=True)
                 if world == "doors":
                     continue  # nothing to close
-                opened = run(arguments.program, sequence, sensor, OPEN, arguments.scratch / "out")
+                opened = run(arguments.program, sequence, sensor, OPEN + settings, arguments.scratch / "out")
                 ratio = f"{opened['gap'] / closed['gap']:.1f}x" if opened and closed else ""
                 print(f"{world:9} {sensor:6} seed {seed:2}  open     {line(opened)}  gap shrinks {ratio}", flush=True)
             if not arguments.keep:
