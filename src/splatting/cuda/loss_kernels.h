@@ -37,6 +37,16 @@ struct Comparison {
   }
 };
 
+/// The part of a loss that a thread block works on: a tile, upper left pixel (x0, y0), of one channel.
+struct ChannelTile {
+  int tile, channel, x0, y0;
+  PHOTOSLAM_DEVICE ChannelTile(int block, const Extent& image)
+      : tile(block % image.tiles()),
+        channel(block / image.tiles()),
+        x0(tile % image.tiles_x() * kTileSize),
+        y0(tile / image.tiles_x() * kTileSize) {}
+};
+
 inline constexpr int kTileWarps = kTilePixels / kWarpSize;
 
 /// Sums of values over the block's threads, in a fixed order; thread 0 gets them. `scratch` [kCount] rows.
@@ -87,8 +97,7 @@ struct SsimKernel {
   template <class Group>
   PHOTOSLAM_DEVICE void operator()(Group& group, Shared& shared) const {
     const Extent& image = images.image;
-    const int tiles = image.tiles(), tile = group.block() % tiles, channel = group.block() / tiles;
-    const int x0 = tile % image.tiles_x() * kTileSize, y0 = tile / image.tiles_x() * kTileSize;
+    const auto [tile, channel, x0, y0] = ChannelTile(group.block(), image);
     const int thread = group.thread();
     for (int i = thread; i < kWindowSize * kWindowSize; i += kThreads) {
       const int x = i % kWindowSize, y = i / kWindowSize;
@@ -102,7 +111,7 @@ struct SsimKernel {
     float ssim[1] = {0};
     if (x0 + x < image.width && y0 + y < image.height) ssim[0] = compare(shared, channel, x0, y0, x, y);
     block_sums(group, ssim, shared.scratch);
-    if (thread == 0) sums[(channel * kLossSums + kSumSsim) * tiles + tile] = ssim[0];
+    if (thread == 0) sums[(channel * kLossSums + kSumSsim) * image.tiles() + tile] = ssim[0];
   }
 
   PHOTOSLAM_DEVICE static void filter_signals(Shared& shared, int x, int y) {
@@ -156,8 +165,7 @@ struct PhotometricKernel {
   template <class Group>
   PHOTOSLAM_DEVICE void operator()(Group& group, Shared& shared) const {
     const Extent& image = images.image;
-    const int tiles = image.tiles(), tile = group.block() % tiles, channel = group.block() / tiles;
-    const int x0 = tile % image.tiles_x() * kTileSize, y0 = tile / image.tiles_x() * kTileSize;
+    const auto [tile, channel, x0, y0] = ChannelTile(group.block(), image);
     const int thread = group.thread(), x = x0 + thread % kTileSize, y = y0 + thread / kTileSize;
     float a = 0, b = 0;
     images.load(channel, x, y, a, b);
@@ -179,7 +187,7 @@ struct PhotometricKernel {
     float terms[kSumSsim] = {fabsf(difference), clamped * clamped, by_value, by_value * a};
     block_sums(group, terms, shared.scratch);
     if (thread != 0) return;
-    for (int i = 0; i < kSumSsim; ++i) sums[(channel * kLossSums + i) * tiles + tile] = terms[i];
+    for (int i = 0; i < kSumSsim; ++i) sums[(channel * kLossSums + i) * image.tiles() + tile] = terms[i];
   }
 
   /// One derivative, filtered around this thread's pixel.

@@ -34,6 +34,17 @@ struct Extent {
   PHOTOSLAM_DEVICE int tiles() const { return tiles_x() * tiles_y(); }
 };
 
+/// Projects one gaussian of a block.
+PHOTOSLAM_DEVICE scalar::Projection<float> project_lane(const Block& block, uint32_t lane, const AnchorView& view) {
+  float mean[3], rotation[4], log_scale[3];
+  for (int i = 0; i < 3; ++i) mean[i] = block.parameters[row::kMean + i][lane];
+  for (int i = 0; i < 4; ++i) rotation[i] = block.parameters[row::kRotation + i][lane];
+  for (int i = 0; i < 3; ++i) log_scale[i] = block.parameters[row::kLogScale + i][lane];
+  scalar::Projection<float> g;
+  scalar::project(view, mean, rotation, log_scale, g);
+  return g;
+}
+
 /// log2(alpha) at a pixel, and where it lies. Fused by hand: every kernel must round alike.
 PHOTOSLAM_DEVICE float log2_alpha(const Splat& s, float x, float y, float& t, float& dy) {
   dy = y - s.v;
@@ -118,12 +129,7 @@ struct ProjectKernel {
     const uint32_t lane = slot % kBlockSize;
     if (static_cast<int>(lane) >= block.count) return false;
     const AnchorView& view = views[block.anchor];
-    float mean[3], rotation[4], log_scale[3];
-    for (int i = 0; i < 3; ++i) mean[i] = block.parameters[row::kMean + i][lane];
-    for (int i = 0; i < 4; ++i) rotation[i] = block.parameters[row::kRotation + i][lane];
-    for (int i = 0; i < 3; ++i) log_scale[i] = block.parameters[row::kLogScale + i][lane];
-    scalar::Projection<float> g;
-    scalar::project(view, mean, rotation, log_scale, g);
+    const scalar::Projection<float> g = project_lane(block, lane, view);
     const float logit = block.parameters[row::kOpacity][lane];
     s.log2_opacity = -log2f(1.0f + expf(fminf(-logit, 80.0f)));
     const float cut = s.log2_opacity + kLog2Cut;
@@ -142,7 +148,7 @@ struct ProjectKernel {
               (g.inv_norm > 1.0f / kAbsurd) & (g.det > 0) & (inv_det > 0) & (s.u + s.extent_x >= 0) &
               (s.v + s.extent_y >= 0) & (s.u - s.extent_x <= static_cast<float>(image.width - 1)) &
               (s.v - s.extent_y <= static_cast<float>(image.height - 1));
-    for (int i = 0; i < 3; ++i) ok = ok & (fabsf(log_scale[i]) < kAbsurd);
+    for (int i = 0; i < 3; ++i) ok = ok & (fabsf(block.parameters[row::kLogScale + i][lane]) < kAbsurd);
     if (!ok) return false;
     float direction[3], basis[kNumShCoefficients];
     const int coefficients = (sh_degree + 1) * (sh_degree + 1);

@@ -90,12 +90,7 @@ struct UpdateKernel {
   PHOTOSLAM_DEVICE bool differentiate(const Block& block, uint32_t lane, const SplatGradient& sum,
                                       scalar::ScreenGradient<float>& s, Gradient& out) const {
     const AnchorView& view = views[block.anchor];
-    float mean[3], rotation[4], log_scale[3];
-    for (int i = 0; i < 3; ++i) mean[i] = block.parameters[row::kMean + i][lane];
-    for (int i = 0; i < 4; ++i) rotation[i] = block.parameters[row::kRotation + i][lane];
-    for (int i = 0; i < 3; ++i) log_scale[i] = block.parameters[row::kLogScale + i][lane];
-    scalar::Projection<float> g;
-    scalar::project(view, mean, rotation, log_scale, g);
+    const scalar::Projection<float> g = project_lane(block, lane, view);
     s = scalar::screen_gradient<float>(g, {sum.t, sum.dy, sum.tt, sum.t_dy, sum.dy_dy, sum.z});
     const float size = fabsf(s.u) + fabsf(s.v) + fabsf(s.exx) + fabsf(s.eyy) + fabsf(s.exy) + fabsf(s.z) +
                        fabsf(sum.rgb[0]) + fabsf(sum.rgb[1]) + fabsf(sum.rgb[2]);

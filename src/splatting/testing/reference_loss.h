@@ -86,4 +86,21 @@ inline double photometric_loss(const LossCase& c, double lambda, const std::vect
   return (1 - lambda) * l1 / count + lambda * (1 - ssim / count);
 }
 
+/// How far a gradient image [3, H, W] lies from central differences, at some pixels: relative L2 distance.
+inline double gradient_error(const LossCase& c, double lambda, const std::vector<float>& gradient) {
+  constexpr double kStep = 1e-5;
+  Random random(8);
+  double difference = 0, norm = 0;
+  for (int probe = 0; probe < 12; ++probe) {
+    const size_t i = static_cast<size_t>(random.index(static_cast<int>(c.render.size())));
+    std::vector<double> plus = c.render, minus = c.render;
+    plus[i] += kStep;
+    minus[i] -= kStep;
+    const double numeric = (photometric_loss(c, lambda, plus) - photometric_loss(c, lambda, minus)) / (2 * kStep);
+    difference += std::pow(numeric - static_cast<double>(gradient[i]), 2);
+    norm += numeric * numeric;
+  }
+  return std::sqrt(difference / norm);
+}
+
 }  // namespace photoslam::reference
