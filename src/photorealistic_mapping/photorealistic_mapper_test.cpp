@@ -7,13 +7,9 @@
 #include <cmath>
 
 #include "base/archive.h"
-#include "geometry/testing/textured_wall.h"
 #include "image/convert.h"
-#include "map/map.h"
+#include "photorealistic_mapping/testing/wall_with_keyframes.h"
 #include "photorealistic_mapping/view_geometry.h"
-#include "splatting/cuda/engine.h"
-#include "splatting/cuda/host_device.h"
-#include "splatting/gpu.h"
 
 namespace photoslam {
 namespace {
@@ -22,48 +18,6 @@ constexpr PinholeCamera kCamera = {320, 240, 280, 280, 166.5, 114};
 constexpr double kBaseline = 0.2;
 
 SE3 at(double x, double y = 0) { return {Quat::Identity(), Vec3(-x, -y, 0)}; }
-
-/// Keyframes before a textured wall, with landmarks at exact positions, as geometry mapping would deliver them.
-class WallWithKeyframes {
- public:
-  void add(const SE3& camera_from_world) {
-    const KeyframeId id(static_cast<int32_t>(map_.num_keyframes()));
-    auto frame = std::make_shared<FeatureFrame>();
-    std::vector<Vec3> points;
-    for (int y = 20; y < kCamera.height - 20; y += 20) {
-      for (int x = 20; x < kCamera.width - 20; x += 20) {
-        Keypoint keypoint;
-        keypoint.x = static_cast<float>(x);
-        keypoint.y = static_cast<float>(y);
-        frame->features.keypoints.push_back(keypoint);
-        frame->features.descriptors.push_back({});
-        frame->observations.push_back({.pixel = Vec2(x, y)});
-        const double depth = wall.look(kCamera, camera_from_world, x, y).depth;
-        points.push_back(camera_from_world.inverse() * kCamera.unproject(Vec2(x, y), depth));
-      }
-    }
-    frame->depth.assign(points.size(), 0.0f);
-    map_.add_keyframe(id, frame, camera_from_world);
-    // Each keyframe sees its own landmarks and half of those of the one before, so that they are covisible.
-    for (size_t i = 0; i < points.size(); ++i) {
-      const bool shared = id.value > 0 && i % 2 == 0;
-      const LandmarkId landmark = shared ? LandmarkId(static_cast<int32_t>(i)) : LandmarkId();
-      if (shared && map_.add_observation(landmark, id, static_cast<int>(i))) {
-        map_.set_position(landmark, points[i]);
-      } else {
-        map_.update_view(map_.add_landmark(points[i], id, static_cast<int>(i)));
-      }
-    }
-  }
-  std::shared_ptr<const MapSnapshot> snapshot() { return map_.snapshot(); }
-  void apply(const MapCorrection& correction) { map_.apply(correction); }
-  ImageU8 picture(const SE3& camera_from_world) const { return wall.picture(kCamera, camera_from_world); }
-
-  photoslam::testing::TexturedWall wall;
-
- private:
-  Map map_{1.2, 8};
-};
 
 class PhotorealisticMapperTest : public ::testing::Test {
  protected:
@@ -94,7 +48,7 @@ class PhotorealisticMapperTest : public ::testing::Test {
     return {{}, {}, world_.picture(right_from_left * pose)};
   }
 
-  WallWithKeyframes world_;
+  testing::WallWithKeyframes world_{kCamera};
   ThreadPool executor_{2};
   int32_t count_ = 0;
 };
@@ -133,7 +87,7 @@ TEST_F(PhotorealisticMapperTest, ExposureIsToldFromColor) {
     PhotorealisticOptions options;
     options.exposure.enabled = enabled;
     PhotorealisticMapper mapper(options, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
-    world_ = {};
+    world_ = testing::WallWithKeyframes(kCamera);
     count_ = 0;
     for (size_t i = 0; i < gains.size(); ++i) {
       const SE3 pose = at(0.15 * static_cast<double>(i));
@@ -258,42 +212,6 @@ TEST_F(PhotorealisticMapperTest, ContinuesFromAnArchiveAsIfNothingHadHappened) {
   }
   EXPECT_EQ(mapper.gaussians().size(), loaded.gaussians().size());
 }
-
-#ifndef __SANITIZE_THREAD__  // it does not know fibers
-TEST_F(PhotorealisticMapperTest, MapsOnAGpuAsOnTheCpu) {
-  // The GPU is the host in its role: slow, so few and coarse iterations.
-  const auto gpu =
-      std::make_shared<splatting::Gpu>(std::make_unique<splatting::cuda::Engine<splatting::cuda::HostDevice>>(
-                                           splatting::cuda::HostDevice(), uint64_t{1} << 30),
-                                       "host");
-  PhotorealisticOptions options;
-  options.schedule.start_pixels = 1;
-  options.reseed_interval = 2;
-  options.densification.interval = 10;
-  options.seeding.cell_px = 24;
-  const MapperSensor sensor{.camera = kCamera, .stereo_baseline_m = kBaseline};
-  PhotorealisticMapper cpu(options, sensor, 1), remote(options, sensor, 1, gpu);
-  for (PhotorealisticMapper* mapper : {&cpu, &remote}) {
-    count_ = 0;
-    world_ = WallWithKeyframes();
-    for (const double x : {0.0, 0.3}) {
-      add(*mapper, at(x), stereo(at(x)));
-      for (int i = 0; i < 4; ++i) mapper->train({}, executor_);
-    }
-  }
-  EXPECT_EQ(gpu->failure(), "");
-  EXPECT_GT(gpu->peak_mb(), 1);
-  EXPECT_NEAR(remote.training_psnr(), cpu.training_psnr(), 0.01);
-  const auto size = static_cast<double>(cpu.gaussians().size());
-  EXPECT_NEAR(static_cast<double>(remote.gaussians().size()), size, 0.01 * size);
-  Archive saved;
-  remote.serialize(saved);
-  PhotorealisticMapper loaded(options, sensor, 99);
-  Archive reader(saved.bytes());
-  loaded.serialize(reader);
-  EXPECT_EQ(loaded.gaussians().size(), remote.gaussians().size());
-}
-#endif
 
 TEST_F(PhotorealisticMapperTest, ForgetsPicturesBeyondTheBudgetAndGoesOn) {
   const MapperSensor sensor{.camera = kCamera, .stereo_baseline_m = kBaseline};

@@ -120,12 +120,12 @@ void Engine<Device>::arrange(const Arrangement& a) {
   device_.upload(anchors.data(), a.anchors, a.num_blocks * sizeof(int32_t));
   device_.upload(counts.data(), a.counts, a.num_blocks * sizeof(int32_t));
   device_.upload(records.data(), a.records, size_t{a.num_records} * row::kTableRows * sizeof(float));
+  Block* const to = in_place ? blocks_.data() : target.data();
   device_.launch(static_cast<int>(a.num_blocks),
-                 RearrangeKernel{blocks_.data(), in_place ? blocks_.data() : target.data(), sources.data(),
-                                 anchors.data(), counts.data(), records.data()});
+                 RearrangeKernel{blocks_.data(), to, sources.data(), anchors.data(), counts.data(), records.data()});
+  if (a.clear_statistics) device_.launch(static_cast<int>(a.num_blocks), ClearStatistics{to});
   if (!in_place) std::swap(blocks_, target);
   num_blocks_ = a.num_blocks;
-  if (a.clear_statistics) device_.launch(static_cast<int>(num_blocks_), ClearStatistics{blocks_.data()});
 }
 
 template <class Device>
