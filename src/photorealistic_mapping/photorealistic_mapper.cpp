@@ -215,8 +215,10 @@ void PhotorealisticMapper::keep_image_budget() {
 
 void PhotorealisticMapper::set_images(const ImageU8& color, const ImageU16& depth, TrainingView& view) const {
   const CameraView full{sensor_.camera, color, depth, sensor_.mask};
+  // Only a depth loss looks at the depths of smaller levels, and their medians cost more than all the colours.
+  const CameraView shrinking{full.camera, color, options_.depth_weight > 0 ? depth : ImageU16(), full.mask};
   for (int level = 0; level <= schedule_.coarsest_level(); ++level) {
-    const CameraView small = level == 0 ? full : shrink(full, 1 << level);
+    const CameraView small = level == 0 ? full : shrink(shrinking, 1 << level);
     view.cameras.push_back(small.camera);
     splatting::TargetImage& target =
         view.targets.emplace_back(small.camera.width, small.camera.height, small.color.values(), small.mask.values());
