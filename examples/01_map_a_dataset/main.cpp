@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
   try {
     const photoslam::SlamResult result = photoslam::map_dataset(argv[1], {.realtime = false});
     std::cout << result.tracked << " of " << result.frames << " frames tracked, " << result.map.num_gaussians()
-              << " gaussians\n";
+              << " gaussians, trained on " << (result.gpu.empty() ? "the CPU" : result.gpu) << "\n";
     if (result.trajectory.empty()) return 1;
     result.map.save(argv[2]);
     const std::vector<uint8_t> picture = result.map.render(result.camera, result.trajectory.back());

@@ -14,6 +14,9 @@
 
 namespace photoslam {
 
+/// What trains the gaussians: the GPU if there is a usable one, else the CPU; the CPU; the GPU.
+enum class Backend { automatic, cpu, cuda };
+
 struct SlamSettings {
   /// Frames are used at the pace of their timestamps, and dropped when they come too fast; otherwise none is dropped.
   bool realtime = true;
@@ -23,6 +26,9 @@ struct SlamSettings {
   int threads = 0;            ///< For mapping; 0: one per core.
   double refine_seconds = 0;  ///< Keep improving the map for so long after the last frame.
   int refine_iterations = 0;  ///< The same, counted; the only one that deterministic runs take.
+  /// Backend::cuda without a GPU is a Failure. When a GPU fails on the way, the CPU goes on.
+  Backend backend = Backend::automatic;
+  double gpu_memory_mb = 2000;  ///< At most so much of the GPU's memory is used.
   /// Configuration values as "key=value"; `photoslam config` lists them.
   std::vector<std::string> configuration;
 };
@@ -36,6 +42,8 @@ struct SlamResult {
   std::vector<CameraPose> keyframes;   ///< Of those among them that the map was trained on.
   CameraModel camera;                  ///< The undistorted camera that the map is rendered with.
   SplatMap map;
+  std::string gpu;          ///< The GPU that trained the gaussians; empty: the CPU did …
+  std::string gpu_failure;  ///< … or went on when the GPU failed, and why that was.
   /// Names the component that failed, and why; empty when all went well. The rest is what was made before.
   std::string failure;
 };

@@ -102,6 +102,18 @@ TEST(MapFrames, CountsABrokenFrame) {
   EXPECT_EQ(result.failure, "");
 }
 
+TEST(MapFrames, TrainsWhereItIsAskedTo) {
+  SlamSettings settings = deterministic();
+  settings.backend = Backend::cpu;
+  EXPECT_EQ(map_wall(3, settings).gpu, "");
+  settings.backend = Backend::cuda;
+  try {
+    EXPECT_NE(map_wall(3, settings).gpu, "");
+  } catch (const Failure& failure) {
+    EXPECT_NE(std::string(failure.what()).find("no GPU"), std::string::npos) << failure.what();
+  }
+}
+
 TEST(MapFrames, RejectsBadArguments) {
   const RgbdInput none = [] { return std::optional<RgbdFrame>(); };
   EXPECT_THROW(map_frames({}, 0.001, none), Failure);

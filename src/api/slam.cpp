@@ -13,6 +13,7 @@
 #include "pipeline/frame_rectifier.h"
 #include "pipeline/system.h"
 #include "sources/open_source.h"
+#include "splatting/gpu.h"
 
 namespace photoslam {
 namespace {
@@ -61,6 +62,16 @@ class CallerSource final : public FrameSource {
   int64_t last_timestamp_ns_ = std::numeric_limits<int64_t>::min();
 };
 
+std::shared_ptr<splatting::Gpu> open_gpu(const SlamSettings& settings) {
+  const auto backend = settings.backend == Backend::cpu    ? splatting::Backend::cpu
+                       : settings.backend == Backend::cuda ? splatting::Backend::cuda
+                                                           : splatting::Backend::automatic;
+  std::string note;
+  const auto gpu = splatting::choose_backend(backend, settings.gpu_memory_mb, note);
+  if (!gpu) throw Failure(gpu.error().message);
+  return *gpu;
+}
+
 RunSettings to_run_settings(const SlamSettings& settings) {
   if (settings.deterministic && settings.refine_seconds > 0)
     throw Failure("refine_seconds depends on the clock; deterministic runs take refine_iterations");
@@ -71,6 +82,7 @@ RunSettings to_run_settings(const SlamSettings& settings) {
   run.threads = settings.threads;
   run.refine_seconds = settings.refine_seconds;
   run.refine_iterations = settings.refine_iterations;
+  run.gpu = open_gpu(settings);
   return run;
 }
 
@@ -94,7 +106,8 @@ SlamResult map_source(FrameSource& source, const SlamSettings& settings, const K
     if (keep_going && !keep_going(progress.frames)) stop.request_stop();
   };
   const SourceInfo info = source.info();
-  const RunOutcome run = run_slam(options, to_run_settings(settings), source, stop.get_token(), on_progress);
+  const RunSettings run_settings = to_run_settings(settings);
+  const RunOutcome run = run_slam(options, run_settings, source, stop.get_token(), on_progress);
 
   SlamResult result;
   result.frames = static_cast<int>(run.frames.size());
@@ -107,6 +120,10 @@ SlamResult map_source(FrameSource& source, const SlamSettings& settings, const K
   const PinholeCamera camera = FrameRectifier(info).camera();
   result.camera = {camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, {}};
   result.map = SplatMapAccess::make(to_world(run.final.gaussians, run.final.anchors_from_world));
+  if (run_settings.gpu) {
+    result.gpu = run_settings.gpu->name();
+    result.gpu_failure = run_settings.gpu->failure();
+  }
   result.failure = run.failure;
   return result;
 }

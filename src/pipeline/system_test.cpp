@@ -9,6 +9,9 @@
 #include "math/umeyama.h"
 #include "pipeline/frame_rectifier.h"
 #include "pipeline/testing/corner_source.h"
+#include "splatting/cuda/engine.h"
+#include "splatting/cuda/host_device.h"
+#include "splatting/gpu.h"
 
 namespace photoslam {
 namespace {
@@ -61,6 +64,25 @@ TEST(RunSlam, TracksAnExactSequenceClosely) {
     EXPECT_LT(error.translation.norm(), 0.03) << "frame " << frame.frame.value;
   }
 }
+
+#ifndef __SANITIZE_THREAD__  // it does not know fibers
+TEST(RunSlam, GoesOnWhenTheGpuIsLost) {
+  using splatting::cuda::HostDevice;
+  splatting::cuda::HostFaults faults;
+  faults.lost = [calls = 0]() mutable { return ++calls > 200; };  // after a few iterations
+  RunSettings settings = deterministic(1);
+  settings.gpu = std::make_shared<splatting::Gpu>(
+      std::make_unique<splatting::cuda::Engine<HostDevice>>(HostDevice(splatting::cuda::ThreadOrder::forwards, &faults),
+                                                            uint64_t{1} << 30),
+      "host");
+  const RunOutcome outcome = run(CornerSource(20), settings);
+  EXPECT_NE(settings.gpu->failure(), "");
+  EXPECT_EQ(outcome.failure, "");
+  for (const FrameOutcome& frame : outcome.frames) EXPECT_TRUE(frame.has_pose) << frame.frame.value;
+  EXPECT_EQ(outcome.iterations, run(CornerSource(20), deterministic(1)).iterations);
+  EXPECT_GT(outcome.final.gaussians.size(), 200u);
+}
+#endif
 
 TEST(RunSlam, TracksADistortedStereoRig) {
   const CornerSource source(40, 320, 240, SensorKind::stereo);
