@@ -154,7 +154,7 @@ if [ "$mode" = check ]; then
     if [ -n "$sanitizer" ]; then
       step "memcheck" 90 "$sanitizer" --tool memcheck --leak-check full --error-exitcode 1 "$build/engine_device_test"
       step "racecheck" 90 "$sanitizer" --tool racecheck --error-exitcode 1 "$build/engine_device_test" Sort Prefix Loss StepIsAdam Images
-      step "initcheck" 60 "$sanitizer" --tool initcheck --error-exitcode 1 "$build/engine_device_test" Sort Prefix Loss StepIsAdam Arrange
+      step "initcheck" 60 "$sanitizer" --tool initcheck --error-exitcode 1 "$build/engine_device_test" Sort Prefix Loss StepIsAdam Arrange Fates
       step "synccheck" 60 "$sanitizer" --tool synccheck --error-exitcode 1 "$build/engine_device_test" Sort Prefix Loss StepIsAdam Images
     else
       note "| compute-sanitizer | not there | |"

@@ -4,41 +4,33 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <limits>
 #include <vector>
 
-#include "math/se3.h"
+#include "splatting/density.h"
 
 namespace photoslam {
+
 namespace {
 
-using splatting::Gaussian;
+using splatting::DensityRules;
+using splatting::Fate;
 
 constexpr float kMinViews = 3;  // that must have judged a gaussian
 
-bool is_idle(const DensificationOptions& options, const splatting::Statistics& statistics) {
-  return statistics.visible >= kMinViews && static_cast<double>(statistics.max_weight) < options.min_weight;
+/// Idle gaussians go, none doubles.
+DensityRules idle_rules(const DensificationOptions& options) {
+  DensityRules rules;
+  rules.by_statistics = true;
+  rules.views_to_judge = kMinViews;
+  rules.min_weight = options.min_weight;
+  rules.gradient_threshold = std::numeric_limits<double>::infinity();
+  return rules;
 }
 
-double largest_scale(const Gaussian& g) {
-  return std::exp(static_cast<double>(std::max({g.log_scale[0], g.log_scale[1], g.log_scale[2]})));
-}
-
-/// One of the two halves of a gaussian: drawn from it, 1.6 times smaller, as in 3D Gaussian splatting.
-Gaussian half_of(const Gaussian& parent, Random& random) {
-  constexpr double kShrink = 1.6;
-  Gaussian child = parent;
-  const Quat rotation = Quat(static_cast<double>(parent.rotation[0]), static_cast<double>(parent.rotation[1]),
-                             static_cast<double>(parent.rotation[2]), static_cast<double>(parent.rotation[3]))
-                            .normalized();
-  Vec3 offset;
-  for (int i = 0; i < 3; ++i) {
-    offset[i] = random.normal() * std::exp(static_cast<double>(parent.log_scale[i]));
-    child.log_scale[i] = parent.log_scale[i] - static_cast<float>(std::log(kShrink));
-  }
-  offset = rotation * offset;
-  for (int i = 0; i < 3; ++i) child.mean[i] += static_cast<float>(offset[i]);
-  return child;
+size_t remove_by(const DensityRules& rules, splatting::GaussianModel& model) {
+  const std::vector<Fate> fates = model.judge(rules);
+  return model.remove_if([&](size_t index) { return fates[index] == Fate::goes; });
 }
 
 }  // namespace
@@ -62,41 +54,31 @@ void DensificationOptions::visit(OptionVisitor& v) {
 
 DensificationCounts densify(const DensificationOptions& options, double scene_depth, Random& random,
                             splatting::GaussianModel& model) {
+  DensityRules rules = idle_rules(options);
+  rules.gradient_threshold = options.gradient_threshold;
+  rules.split_log_scale = std::log(options.split_size * scene_depth);
+  std::vector<Fate> fates = model.judge(rules);
+
   DensificationCounts counts;
-  std::map<int, std::vector<Gaussian>> children;  // by anchor
-  std::vector<uint8_t> remove(model.index_end(), 0);
-  size_t room =
-      static_cast<size_t>(options.max_gaussians) - std::min(model.size(), static_cast<size_t>(options.max_gaussians));
+  std::vector<double> normals;  // six per split
+  const auto limit = static_cast<size_t>(options.max_gaussians);
+  size_t room = limit - std::min(model.size(), limit);
   model.for_each([&](size_t index) {
-    const splatting::Statistics statistics = model.statistics(index);
-    if (is_idle(options, statistics)) {
-      remove[index] = 1;
-      ++counts.pruned;
-      return;
-    }
-    if (room == 0 || statistics.visible < 1) return;
-    if (static_cast<double>(statistics.gradient / statistics.visible) < options.gradient_threshold) return;
-    const Gaussian gaussian = model.get(index);
-    std::vector<Gaussian>& siblings = children[model.anchor(index)];
-    --room;
-    if (largest_scale(gaussian) > options.split_size * scene_depth) {
-      siblings.push_back(half_of(gaussian, random));
-      siblings.push_back(half_of(gaussian, random));
-      remove[index] = 1;
-      ++counts.split;
-    } else {
-      siblings.push_back(gaussian);
-      ++counts.cloned;
-    }
+    Fate& fate = fates[index];
+    if (room == 0 && fate != Fate::goes) fate = Fate::stays;
+    counts.pruned += fate == Fate::goes;
+    counts.cloned += fate == Fate::clones;
+    counts.split += fate == Fate::splits;
+    if (fate == Fate::clones || fate == Fate::splits) --room;
+    for (int i = 0; fate == Fate::splits && i < 6; ++i) normals.push_back(random.normal());
   });
-  model.remove(remove);
-  for (const auto& [anchor, gaussians] : children) model.add(anchor, gaussians);
+  model.breed(fates, normals);
   model.reset_statistics();
   return counts;
 }
 
 size_t prune_idle(const DensificationOptions& options, splatting::GaussianModel& model) {
-  const size_t removed = model.remove_if([&](size_t index) { return is_idle(options, model.statistics(index)); });
+  const size_t removed = remove_by(idle_rules(options), model);
   model.reset_statistics();
   return removed;
 }
@@ -117,14 +99,11 @@ size_t make_room(const DensificationOptions& options, size_t newcomers, splattin
 }
 
 size_t prune(const DensificationOptions& options, double scene_depth, splatting::GaussianModel& model) {
-  const auto min_logit = static_cast<float>(std::log(options.min_opacity / (1.0 - options.min_opacity)));
-  const auto max_log_scale = static_cast<float>(std::log(options.max_scale * scene_depth));
-  return model.remove_if([&](size_t index) {
-    const Gaussian g = model.get(index);
-    const float largest = std::max({g.log_scale[0], g.log_scale[1], g.log_scale[2]});
-    const bool finite = std::isfinite(g.mean[0] + g.mean[1] + g.mean[2] + largest + g.opacity_logit);
-    return !finite || g.opacity_logit < min_logit || largest > max_log_scale;
-  });
+  DensityRules rules;
+  rules.by_shape = true;
+  rules.min_opacity_logit = static_cast<float>(std::log(options.min_opacity / (1.0 - options.min_opacity)));
+  rules.max_log_scale = static_cast<float>(std::log(options.max_scale * scene_depth));
+  return remove_by(rules, model);
 }
 
 }  // namespace photoslam

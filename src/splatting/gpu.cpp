@@ -36,7 +36,37 @@ struct Gpu::State {
   void fail(const std::string& what) {
     if (failure.empty()) failure = what;
   }
+  /// Does something on the GPU; false if that has failed, now or before.
+  template <class Work>
+  bool attempt(Work&& work) {
+    if (!failure.empty()) return false;
+    try {
+      work();
+      return true;
+    } catch (const cuda::DeviceError& e) {
+      fail(e.what());
+      return false;
+    }
+  }
+  void exchange(const GaussianModel& model) const;
 };
+
+/// Makes the model there like the model here.
+void Gpu::State::exchange(const GaussianModel& model) const {
+  const auto changes = model.changes();
+  if (!changes) return;
+  cuda::Arrangement arrangement;
+  arrangement.num_blocks = static_cast<uint32_t>(model.num_blocks());
+  arrangement.sources = changes->sources.data();
+  arrangement.anchors = changes->anchors.data();
+  arrangement.counts = changes->counts.data();
+  arrangement.records = changes->records.data();
+  arrangement.num_records = static_cast<uint32_t>(changes->records.size() / row::kTableRows);
+  arrangement.moves = changes->moves;
+  arrangement.clear_statistics = changes->clear_statistics;
+  engine->arrange(arrangement);
+  model.exchanged();
+}
 
 /// The model on the GPU, as the model on the host sees it.
 class Gpu::Residence final : public RemoteModel {
@@ -50,6 +80,19 @@ class Gpu::Residence final : public RemoteModel {
       state_->fail(e.what());
       return false;
     }
+  }
+  bool judge(const GaussianModel& model, const DensityRules& rules, std::span<Fate> fates) override {
+    return state_->attempt([&] {
+      state_->exchange(model);
+      state_->engine->judge(rules, fates.data());
+    });
+  }
+  std::optional<size_t> breed(const GaussianModel& model, std::span<const Child> children) override {
+    const bool done = state_->attempt([&] {
+      state_->exchange(model);
+      state_->engine->breed(children.data(), static_cast<uint32_t>(children.size()));
+    });
+    return done ? std::optional(model.index_end()) : std::nullopt;
   }
   const State* state() const { return state_.get(); }
 
@@ -146,20 +189,13 @@ const std::string& Gpu::failure() const { return state_->failure; }
 /// Does something with the model there; false if that has failed, now or before.
 template <class Work>
 bool Gpu::attempt(const GaussianModel& model, Work&& work) {
-  if (state_->failure.empty()) {
-    try {
-      work();
-      return true;
-    } catch (const cuda::DeviceError& e) {
-      state_->fail(e.what());
-    }
-  }
+  if (state_->attempt(std::forward<Work>(work))) return true;
   model.bring_home();
   return false;
 }
 
-/// Makes the model there like the model here.
-void Gpu::exchange(const GaussianModel& model) {
+/// Moves in what is not there yet, and makes it like the model here.
+void Gpu::settle(const GaussianModel& model) {
   const auto* const residence = dynamic_cast<const Residence*>(model.remote());
   if (residence == nullptr || residence->state() != state_.get()) {
     PHOTOSLAM_CHECK(state_->resident.expired(), "the GPU holds another model");
@@ -167,19 +203,7 @@ void Gpu::exchange(const GaussianModel& model) {
     model.attach(created);
     state_->resident = created;
   }
-  const auto changes = model.changes();
-  if (!changes) return;
-  cuda::Arrangement arrangement;
-  arrangement.num_blocks = static_cast<uint32_t>(model.num_blocks());
-  arrangement.sources = changes->sources.data();
-  arrangement.anchors = changes->anchors.data();
-  arrangement.counts = changes->counts.data();
-  arrangement.records = changes->records.data();
-  arrangement.num_records = static_cast<uint32_t>(changes->records.size() / row::kTableRows);
-  arrangement.moves = changes->moves;
-  arrangement.clear_statistics = changes->clear_statistics;
-  state_->engine->arrange(arrangement);
-  model.exchanged();
+  state_->exchange(model);
 }
 
 cuda::DeviceView Gpu::device_view(const GaussianModel& model, const View& view, const RenderOptions& options) {
@@ -204,7 +228,7 @@ std::optional<StepResult> Gpu::step(GaussianModel& model, const View& view, cons
   std::optional<StepResult> result;
   attempt(model, [&] {
     const cuda::DeviceView on_device = device_view(model, view, options.render);
-    exchange(model);
+    settle(model);
     cuda::DeviceLoss loss;
     std::copy_n(options.exposure.gain, 3, loss.gain);
     std::copy_n(options.exposure.bias, 3, loss.bias);
@@ -223,7 +247,7 @@ bool Gpu::forward(const GaussianModel& model, const View& view, const RenderOpti
                   StageTimes& times, int& visible) {
   return attempt(model, [&] {
     const cuda::DeviceView on_device = device_view(model, view, options);
-    exchange(model);
+    settle(model);
     const cuda::Figures figures = state_->engine->forward(on_device, keep);
     times = stage_times(figures);
     state_->busy_ms += times.total();
@@ -243,14 +267,9 @@ bool Gpu::backward(const GaussianModel& model, std::span<const float> dl_drgb, s
 }
 
 bool Gpu::read_image(RenderResult& result) {
-  if (!state_->failure.empty()) return false;
-  try {
-    state_->engine->read_image({result.rgb.data(), result.depth.data(), result.alpha.data()});
-    return true;
-  } catch (const cuda::DeviceError& e) {
-    state_->fail(e.what());  // the model comes home when it is needed
-    return false;
-  }
+  // Should it fail, the model comes home when it is needed.
+  return state_->attempt(
+      [&] { state_->engine->read_image({result.rgb.data(), result.depth.data(), result.alpha.data()}); });
 }
 
 Result<std::string> describe_gpu() {

@@ -48,7 +48,7 @@ class Gpu {
   struct State;
   class Residence;
 
-  void exchange(const GaussianModel& model);
+  void settle(const GaussianModel& model);
   cuda::DeviceView device_view(const GaussianModel& model, const View& view, const RenderOptions& options);
   template <class Work>
   bool attempt(const GaussianModel& model, Work&& work);

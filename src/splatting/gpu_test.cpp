@@ -25,18 +25,20 @@ using testing::Scene;
 /// The engine on the host, that fails when told to.
 class FragileEngine final : public cuda::DeviceEngine {
  public:
-  struct Fate {
+  struct Faults {
     int calls_left = -1;  ///< Until everything fails for good; -1: never.
     int steps_left = -1;  ///< Until steps fail, as they do when memory is short.
     int fetches = 0;
   };
-  FragileEngine(Fate& fate, uint64_t memory_limit) : fate_(fate), engine_(cuda::HostDevice(), memory_limit) {}
+  FragileEngine(Faults& fate, uint64_t memory_limit) : fate_(fate), engine_(cuda::HostDevice(), memory_limit) {}
 
   void arrange(const cuda::Arrangement& arrangement) override { live().arrange(arrangement); }
   void fetch(int first_row, int num_rows, float* rows) override {
     ++fate_.fetches;
     live().fetch(first_row, num_rows, rows);
   }
+  void judge(const DensityRules& rules, Fate* fates) override { live().judge(rules, fates); }
+  void breed(const Child* children, uint32_t count) override { live().breed(children, count); }
   cuda::Figures forward(const cuda::DeviceView& view, bool keep) override { return live().forward(view, keep); }
   void read_image(const cuda::ImagePlanes& image) override { live().read_image(image); }
   cuda::Figures backward(const float* dl_drgb, const float* dl_ddepth, const float* dl_dalpha, float* dense) override {
@@ -57,11 +59,11 @@ class FragileEngine final : public cuda::DeviceEngine {
     if (fate_.calls_left > 0) --fate_.calls_left;
     return engine_;
   }
-  Fate& fate_;
+  Faults& fate_;
   cuda::Engine<cuda::HostDevice> engine_;
 };
 
-std::shared_ptr<Gpu> make_gpu(FragileEngine::Fate& fate) {
+std::shared_ptr<Gpu> make_gpu(FragileEngine::Faults& fate) {
   return std::make_shared<Gpu>(std::make_unique<FragileEngine>(fate, uint64_t{1} << 30), "host");
 }
 
@@ -167,7 +169,7 @@ void expect_training_as_on_the_cpu(const std::shared_ptr<Gpu>& gpu) {
 }
 
 TEST(Gpu, TrainsAsTheCpuDoes) {
-  FragileEngine::Fate fate;
+  FragileEngine::Faults fate;
   expect_training_as_on_the_cpu(make_gpu(fate));
 }
 
@@ -179,7 +181,7 @@ TEST(Gpu, OfThisMachineTrainsAsTheCpuDoes) {
 }
 
 TEST(Gpu, DrawsAsTheCpuDoes) {
-  FragileEngine::Fate fate;
+  FragileEngine::Faults fate;
   const Scene scene = small_scene(53);
   SerialExecutor executor;
   RenderResult want, got;
@@ -191,6 +193,25 @@ TEST(Gpu, DrawsAsTheCpuDoes) {
     for (size_t k = 0; k < want.rgb.size(); ++k) ASSERT_NEAR(got.rgb[k], want.rgb[k], 2e-6f);
     for (size_t k = 0; k < want.depth.size(); ++k) ASSERT_NEAR(got.depth[k], want.depth[k], 1e-5f);
   }
+}
+
+/// By the rules some go; of the others some double.
+void densify(GaussianModel& model, Random& random) {
+  DensityRules rules;
+  rules.by_shape = rules.by_statistics = true;
+  rules.min_opacity_logit = -2;
+  rules.max_log_scale = 10;
+  rules.views_to_judge = 0.5f;
+  rules.min_weight = 0.1;
+  rules.gradient_threshold = 1e9;
+  std::vector<Fate> fates = model.judge(rules);
+  std::vector<double> normals;
+  model.for_each([&](size_t i) {
+    if (fates[i] != Fate::stays || random.uniform() < 0.7) return;
+    fates[i] = random.uniform() < 0.5 ? Fate::clones : Fate::splits;
+    for (int k = 0; fates[i] == Fate::splits && k < 6; ++k) normals.push_back(random.normal());
+  });
+  model.breed(fates, normals);
 }
 
 /// What densification, seeding and loop corrections do to a model.
@@ -213,12 +234,14 @@ void edit(GaussianModel& model, int kind, Random& random) {
     g.mean[0] += 1;
     model.set(index, g);
     model.reset_optimizer(index);
+  } else if (kind == 6) {
+    densify(model, random);
   }
 }
 
 /// A remote copy without arithmetic: what comes back must be what a model without one holds, bit for bit.
 TEST(Gpu, ModelsSurviveAnyOrderOfChangesAndExchanges) {
-  FragileEngine::Fate fate;
+  FragileEngine::Faults fate;
   Scene plain = small_scene(54), remote = small_scene(54);
   Random statistics(55);
   plain.model.for_each([&](size_t i) {
@@ -231,8 +254,8 @@ TEST(Gpu, ModelsSurviveAnyOrderOfChangesAndExchanges) {
   StageTimes times;
   int visible = 0;
   Random choices(56);
-  for (int round = 0; round < 30; ++round) {
-    const int kind = choices.index(6);
+  for (int round = 0; round < 40; ++round) {
+    const int kind = choices.index(7);
     Random a(static_cast<uint64_t>(round)), b(static_cast<uint64_t>(round));
     edit(plain.model, kind, a);
     edit(remote.model, kind, b);
@@ -253,7 +276,7 @@ TEST(Gpu, ModelsSurviveAnyOrderOfChangesAndExchanges) {
 }
 
 TEST(Gpu, FetchesOnceAndOnlyWhatIsAskedFor) {
-  FragileEngine::Fate fate;
+  FragileEngine::Faults fate;
   Scene scene = small_scene(57);
   const TargetImage target = make_target(scene, 58);
   SerialExecutor executor;
@@ -266,11 +289,15 @@ TEST(Gpu, FetchesOnceAndOnlyWhatIsAskedFor) {
   EXPECT_GT(scene.model.statistics(0).visible + scene.model.statistics(1).visible, 0);
   EXPECT_EQ(fate.fetches, 2);
   scene.model.add(0, std::vector<Gaussian>(3));
+  trainer.step(scene.model, scene.view, target, train_options(scene), executor);
+  Random random(59);
+  densify(scene.model, random);
+  trainer.step(scene.model, scene.view, target, train_options(scene), executor);
   EXPECT_EQ(fate.fetches, 2);
 }
 
 TEST(Gpu, WhenMemoryRunsOutTheCpuContinuesFromTheSameValues) {
-  FragileEngine::Fate fate, sound;
+  FragileEngine::Faults fate, sound;
   Scene scene = small_scene(59), other = small_scene(59);
   const TargetImage target = make_target(scene, 60);
   const TrainOptions options = train_options(scene);
@@ -290,7 +317,7 @@ TEST(Gpu, WhenMemoryRunsOutTheCpuContinuesFromTheSameValues) {
 }
 
 TEST(Gpu, WhenItIsGoneTheCpuContinuesFromWhatWasFetchedLast) {
-  FragileEngine::Fate fate;
+  FragileEngine::Faults fate;
   Scene scene = small_scene(61);
   const TargetImage target = make_target(scene, 62);
   const TrainOptions options = train_options(scene);
@@ -312,7 +339,7 @@ TEST(Gpu, WhenItIsGoneTheCpuContinuesFromWhatWasFetchedLast) {
 }
 
 TEST(Gpu, HoldsOneModelAtATime) {
-  FragileEngine::Fate fate;
+  FragileEngine::Faults fate;
   const auto gpu = make_gpu(fate);
   StageTimes times;
   int visible = 0;

@@ -179,6 +179,11 @@ bool GaussianModel::contains(size_t index) const {
 
 Gaussian GaussianModel::get(size_t index) const {
   fetch(kParameters);
+  return read(index);
+}
+
+/// The values that are here.
+Gaussian GaussianModel::read(size_t index) const {
   const Block& block = *blocks_[index / kBlockSize];
   const size_t lane = index % kBlockSize;
   Gaussian g;

@@ -62,12 +62,26 @@ inline constexpr int kTableRows = kStatistics + 4;
 inline const float* table(const Block& block) { return reinterpret_cast<const float*>(&block); }
 inline float* table(Block& block) { return reinterpret_cast<float*>(&block); }
 
+class GaussianModel;
+struct Child;
+struct DensityRules;
+
+/// What becomes of a gaussian.
+enum class Fate : uint8_t { stays, goes, clones, splits };
+
 /// The values of a model on a GPU.
 class RemoteModel {
  public:
   virtual ~RemoteModel() = default;
   /// Rows [first, first + count) of the table of every block: [blocks, count, 64]; false: they are lost.
   virtual bool fetch(int first_row, int num_rows, float* rows) = 0;
+
+  // The following make the copy like the model before; false or nothing: that has failed.
+
+  /// See GaussianModel::judge().
+  virtual bool judge(const GaussianModel& model, const DensityRules& rules, std::span<Fate> fates) = 0;
+  /// Writes children to new blocks behind those of the model, and says in which slot they begin.
+  virtual std::optional<size_t> breed(const GaussianModel& model, std::span<const Child> children) = 0;
 };
 
 /// What a remote copy has to do to become like the model.
@@ -150,6 +164,12 @@ class GaussianModel {
   /// The same with a mask over indices [0, index_end()): nonzero = remove.
   size_t remove(std::span<const uint8_t> mask);
 
+  /// What the rules say of each gaussian: [index_end()].
+  std::vector<Fate> judge(const DensityRules& rules) const;
+  /// Lets it happen. Clones and halves go to the anchor of their parent, in order of the parents, with neither tag nor
+  /// past; the parent of two halves goes. `normals` holds six standard normal numbers per split. All indices change.
+  void breed(std::span<const Fate> fates, std::span<const double> normals);
+
   /// Multiplies means and scales of an anchor's gaussians (a mono scale correction).
   void rescale_anchor(int anchor, float factor);
 
@@ -182,6 +202,7 @@ class GaussianModel {
   enum Part { kParameters = 1, kOptimizer = 2, kStatistics = 4, kAll = 7 };
 
   Block& append_block(int anchor);
+  Gaussian read(size_t index) const;
   void fetch(int parts) const;
   void fetch_rows(int first_row, int num_rows) const;
   void forget_remote() const;

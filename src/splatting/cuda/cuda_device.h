@@ -84,6 +84,12 @@ class CudaDevice {
     check_cuda(cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, stream_), "writing to the GPU");
     if (!fits) wait();
   }
+  /// From one place on the GPU to another.
+  void copy(void* to, const void* from, size_t bytes) {
+    if (bytes == 0) return;
+    bind();
+    check_cuda(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToDevice, stream_), "copying on the GPU");
+  }
   void download(void* to, const void* from, size_t bytes) {
     if (bytes == 0) return;
     bind();

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "splatting/anchor_view.h"
+#include "splatting/density.h"
 #include "splatting/update_constants.h"
 
 namespace photoslam::splatting::cuda {
@@ -91,6 +92,11 @@ class DeviceEngine {
   /// Rows [first, first + count) of all blocks: [num_blocks, count, 64].
   virtual void fetch(int first_row, int num_rows, float* rows) = 0;
 
+  /// A fate per slot: [num_blocks, 64].
+  virtual void judge(const DensityRules& rules, Fate* fates) = 0;
+  /// Appends blocks with these gaussians, filled one after the other, whose parents are slots. They are not drawn yet.
+  virtual void breed(const Child* children, uint32_t count) = 0;
+
   /// Renders; with `keep` a call of backward() may follow.
   virtual Figures forward(const DeviceView& view, bool keep) = 0;
   /// The image rendered last.
@@ -105,7 +111,7 @@ class DeviceEngine {
   virtual uint64_t peak_bytes() const = 0;
 };
 
-inline constexpr int kModuleVersion = 1;
+inline constexpr int kModuleVersion = 2;
 
 /// What the module exports as "photoslam_cuda_module".
 struct Module {

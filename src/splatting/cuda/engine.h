@@ -36,6 +36,8 @@ class Engine final : public DeviceEngine {
     device_.download_rows(rows, &blocks_.data()->parameters[0][0] + first_row * kBlockSize, sizeof(Block),
                           static_cast<size_t>(num_rows) * sizeof(float) * kBlockSize, num_blocks_);
   }
+  void judge(const DensityRules& rules, Fate* fates) override;
+  void breed(const Child* children, uint32_t count) override;
   Figures forward(const DeviceView& view, bool keep) override;
   void read_image(const ImagePlanes& image) override;
   Figures backward(const float* dl_drgb, const float* dl_ddepth, const float* dl_dalpha, float* dense) override;
@@ -126,6 +128,30 @@ void Engine<Device>::arrange(const Arrangement& a) {
   if (a.clear_statistics) device_.launch(static_cast<int>(a.num_blocks), ClearStatistics{to});
   if (!in_place) std::swap(blocks_, target);
   num_blocks_ = a.num_blocks;
+}
+
+template <class Device>
+void Engine<Device>::judge(const DensityRules& rules, Fate* fates) {
+  Buffer<Fate> on_device(memory_);
+  on_device.take(num_slots());
+  device_.launch(static_cast<int>(num_blocks_), JudgeKernel{blocks_.data(), rules, on_device.data()});
+  device_.download(fates, on_device.data(), num_slots() * sizeof(Fate));
+}
+
+template <class Device>
+void Engine<Device>::breed(const Child* children, uint32_t count) {
+  const uint32_t added = static_cast<uint32_t>(blocks_for(count, kBlockSize));
+  Buffer<Child> list(memory_);
+  list.take(count);
+  device_.upload(list.data(), children, count * sizeof(Child));
+  if (num_blocks_ + added > blocks_.size()) {
+    Buffer<Block> larger(memory_);
+    larger.reserve(num_blocks_ + added);
+    device_.copy(larger.data(), blocks_.data(), num_blocks_ * sizeof(Block));
+    std::swap(blocks_, larger);
+  }
+  device_.launch(static_cast<int>(added), BreedKernel{blocks_.data(), num_blocks_, list.data(), count});
+  num_blocks_ += added;
 }
 
 template <class Device>

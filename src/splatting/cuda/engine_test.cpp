@@ -236,7 +236,8 @@ TEST(CudaEngine, LossGradientAgreesWithFiniteDifferences) {
     for (const double lambda : {0.0, 0.2, 1.0}) {
       const reference::LossCase c = reference::make_loss_case(18, 37, masked, 7);
       const LossOnDevice got(c, static_cast<float>(lambda));
-      EXPECT_LE(reference::gradient_error(c, lambda, got.gradient), 1e-4) << "lambda " << lambda << " masked " << masked;
+      EXPECT_LE(reference::gradient_error(c, lambda, got.gradient), 1e-4)
+          << "lambda " << lambda << " masked " << masked;
     }
 }
 
@@ -538,6 +539,70 @@ TEST(CudaEngine, ArrangementsMoveGaussiansWithAllThatBelongsToThem) {
   const std::vector<float> after = device.rows();
   check(after);
   EXPECT_EQ(after[OnDevice::row_at(3 * kBlockSize, 5)], 6);
+}
+
+TEST(CudaEngine, FatesAndChildrenAreThoseOfTheHost) {
+  Scene scene;
+  scene.count = 200;
+  scene.build(31);
+  Random random(32);
+  std::vector<float> opacities, sizes;
+  scene.model.for_each([&](size_t i) {
+    const Gaussian g = scene.model.get(i);
+    opacities.push_back(g.opacity_logit);
+    sizes.push_back(*std::max_element(g.log_scale, g.log_scale + 3));
+  });
+  std::sort(opacities.begin(), opacities.end());
+  std::sort(sizes.begin(), sizes.end());
+  DensityRules rules;
+  rules.by_shape = rules.by_statistics = true;
+  rules.min_opacity_logit = opacities[10];
+  rules.max_log_scale = sizes[180];
+  rules.min_weight = 0.2;
+  rules.gradient_threshold = 0.1;
+  rules.split_log_scale = static_cast<double>(sizes[90]);
+  scene.model.for_each([&](size_t i) {
+    Block& block = scene.model.block(i / kBlockSize);
+    const size_t lane = i % kBlockSize;
+    block.visible[lane] = static_cast<float>(random.index(6));
+    block.gradient[lane] = static_cast<float>(random.uniform());
+    block.max_weight[lane] = static_cast<float>(random.uniform());
+  });
+  scene.model.block(0).parameters[row::kMean][5] = INFINITY;
+  OnDevice device(scene);
+  std::vector<Fate> fates(device.num_blocks * kBlockSize);
+  device.engine.judge(rules, fates.data());
+  size_t counts[4] = {};
+  for (const size_t i : scene.indices) {
+    EXPECT_EQ(fates[i], judge(rules, scene.model.block(i / kBlockSize), static_cast<int>(i % kBlockSize))) << i;
+    ++counts[static_cast<size_t>(fates[i])];
+  }
+  for (const size_t count : counts) EXPECT_GT(count, 3u);
+  EXPECT_EQ(fates[5], Fate::goes);
+
+  const std::vector<float> before = device.rows();
+  std::vector<Child> children(kBlockSize + 6);
+  for (Child& child : children) {
+    child.parent = static_cast<uint32_t>(scene.indices[static_cast<size_t>(random.index(200))]);
+    child.is_half = static_cast<uint32_t>(random.index(2));
+    for (double& n : child.normals) n = random.normal();
+  }
+  const size_t first = device.num_blocks * kBlockSize;
+  device.engine.breed(children.data(), static_cast<uint32_t>(children.size()));
+  device.num_blocks += 2;
+  const std::vector<float> after = device.rows();
+  EXPECT_TRUE(std::equal(before.begin(), before.end(), after.begin()));
+  for (size_t k = 0; k < 2 * kBlockSize; ++k) {
+    float want[row::kTableRows] = {};
+    if (k < children.size()) {
+      for (int r = 0; r < row::kCount; ++r) want[r] = before[OnDevice::row_at(children[k].parent, r)];
+      if (children[k].is_half != 0) halve(children[k].normals, want, 1);
+    }
+    for (int r = 0; r < row::kTableRows; ++r) {
+      const float got = after[OnDevice::row_at(first + k, r)];
+      ASSERT_TRUE(got == want[r] || std::abs(got - want[r]) <= 1e-6f * (1 + std::abs(want[r]))) << k << " row " << r;
+    }
+  }
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "splatting/cuda/project_kernels.h"
+#include "splatting/density.h"
 
 namespace photoslam::splatting::cuda {
 
@@ -38,6 +39,46 @@ struct RearrangeKernel {
       const float* in = &from[source / kBlockSize].parameters[0][0] + source % kBlockSize;
       for (int r = 0; r < row::kTableRows; ++r) out[r * kBlockSize] = in[r * kBlockSize];
     }
+  }
+};
+
+/// One thread block per block of the model.
+struct JudgeKernel {
+  static constexpr int kThreads = kBlockSize;
+  using Shared = NoShared;
+  const Block* blocks;
+  DensityRules rules;
+  Fate* fates;  ///< [slots]
+  template <class Group>
+  PHOTOSLAM_DEVICE void operator()(Group& group, Shared&) const {
+    const int lane = group.thread();
+    const Block& block = blocks[group.block()];
+    fates[group.block() * kBlockSize + lane] = lane < block.count ? judge(rules, block, lane) : Fate::stays;
+  }
+};
+
+/// Writes children to the blocks from `first` on: one thread block per such block.
+struct BreedKernel {
+  static constexpr int kThreads = kBlockSize;
+  using Shared = NoShared;
+  Block* blocks;
+  uint32_t first;
+  const Child* children;
+  uint32_t num_children;
+  template <class Group>
+  PHOTOSLAM_DEVICE void operator()(Group& group, Shared&) const {
+    const uint32_t lane = static_cast<uint32_t>(group.thread());
+    const uint32_t k = static_cast<uint32_t>(group.block()) * kBlockSize + lane;
+    Block& block = blocks[first + static_cast<uint32_t>(group.block())];
+    if (lane == 0) block.anchor = block.count = 0;
+    float* const out = &block.parameters[0][0] + lane;
+    const int inherited = k < num_children ? row::kCount : 0;
+    for (int r = inherited; r < row::kTableRows; ++r) out[r * kBlockSize] = 0;
+    if (k >= num_children) return;
+    const Child& child = children[k];
+    const float* const in = &blocks[child.parent / kBlockSize].parameters[0][0] + child.parent % kBlockSize;
+    for (int r = 0; r < row::kCount; ++r) out[r * kBlockSize] = in[r * kBlockSize];
+    if (child.is_half != 0) halve(child.normals, out, kBlockSize);
   }
 };
 
