@@ -87,8 +87,8 @@ Result<std::vector<FrameScore>> score_run(const EvalArguments& arguments, const 
 std::string as_csv(const std::vector<FrameScore>& scores) {
   std::string csv = "frame,timestamp,psnr_db,ssim\n";
   for (const FrameScore& s : scores) {
-    csv += fmt::format("{},{:.9f},{:.4f},{:.5f}\n", s.frame.value, 1e-9 * static_cast<double>(s.timestamp_ns), s.psnr_db,
-                       s.ssim);
+    csv += fmt::format("{},{:.9f},{:.4f},{:.5f}\n", s.frame.value, 1e-9 * static_cast<double>(s.timestamp_ns),
+                       s.psnr_db, s.ssim);
   }
   return csv;
 }

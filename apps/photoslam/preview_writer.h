@@ -11,8 +11,8 @@
 namespace photoslam {
 
 /// The picture of `--preview`: left the newest keyframe with its features (green where geometry tracks a landmark,
-/// orange elsewhere), in the middle its render, right the way of the camera from above (x to the right, z up, the newest
-/// position marked). Replaced atomically, at most once a second.
+/// orange elsewhere), in the middle its render, right the way of the camera from above (x to the right, z up, the
+/// newest position marked). Replaced atomically, at most once a second.
 ImageU8 compose_preview(const Progress& progress);
 
 class PreviewWriter {

@@ -31,8 +31,8 @@ struct DensificationCounts {
 DensificationCounts densify(const DensificationOptions& options, double scene_depth, Random& random,
                             splatting::GaussianModel& model);
 
-/// Removes what never weighed min_weight in a pixel since the last call, of the gaussians that enough views have judged.
-/// densify() does so too. Resets the statistics.
+/// Removes what never weighed min_weight in a pixel since the last call, of the gaussians that enough views have
+/// judged. densify() does so too. Resets the statistics.
 size_t prune_idle(const DensificationOptions& options, splatting::GaussianModel& model);
 
 /// Makes room under max_gaussians for so many newcomers: of the gaussians that enough views have judged, those go that

@@ -27,10 +27,10 @@ struct ScheduleOptions {
 
 /// Which keyframe is trained next, and on which level of its pyramid (paper, Sec. 3.4, Eq. 5).
 ///
-/// Each keyframe starts at the coarsest level n and moves down one level every uses_per_level uses, until it reaches the
-/// finest one allowed: the full image in refinement, less while frames arrive where that is too costly. What counts is
-/// how large the pictures are, so the levels follow from that. Keyframes at which a correction of the map left a seam go
-/// before all others.
+/// Each keyframe starts at the coarsest level n and moves down one level every uses_per_level uses, until it reaches
+/// the finest one allowed: the full image in refinement, less while frames arrive where that is too costly. What counts
+/// is how large the pictures are, so the levels follow from that. Keyframes at which a correction of the map left a
+/// seam go before all others.
 class KeyframeSchedule {
  public:
   struct Choice {

@@ -92,8 +92,8 @@ class PhotorealisticMapper {
                        std::shared_ptr<splatting::Gpu> gpu = nullptr);
 
   /// Takes over the poses of all keyframes, and with them moves the gaussians. Where a keyframe's scale has changed,
-  /// all that is measured in its frame grows with it. Keyframes that geometry mapping has culled, because others see what
-  /// they see, give their gaussians to their parents, and their pictures are forgotten.
+  /// all that is measured in its frame grows with it. Keyframes that geometry mapping has culled, because others see
+  /// what they see, give their gaussians to their parents, and their pictures are forgotten.
   void update_poses(const MapSnapshot& map);
 
   /// Starts training on the next keyframe (by id) and seeds the part of its image that the map does not explain. An
@@ -172,8 +172,8 @@ class PhotorealisticMapper {
   std::vector<double> anchor_scales_;  // Keyframe::scale as taken over last
   std::vector<TrainingView> views_;
   std::vector<DepthPixel> newest_features_;  // of the keyframe seeded last
-  int num_corrections_ = 0;   // of the map, as taken over last
-  double scene_depth_ = 1.0;  // median over keyframes of their median depth [m]
+  int num_corrections_ = 0;                  // of the map, as taken over last
+  double scene_depth_ = 1.0;                 // median over keyframes of their median depth [m]
   int iteration_ = 0;
   double training_psnr_ = 0;
 };
