@@ -15,7 +15,7 @@ struct DensificationOptions {
   double split_size = 0.01;
   double min_opacity = 0.03;
   double max_scale = 0.25;
-  double min_weight = 0.02;
+  double min_weight = 0.06;
   int max_gaussians = 300000;
   bool relocation = false;
   void visit(OptionVisitor& visitor);
