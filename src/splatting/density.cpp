@@ -5,6 +5,7 @@
 #include <map>
 
 #include "base/check.h"
+#include "splatting/density_formulas.h"
 
 namespace photoslam::splatting {
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "splatting/cuda/project_kernels.h"
-#include "splatting/density.h"
+#include "splatting/density_formulas.h"
 
 namespace photoslam::splatting::cuda {
 
