@@ -388,12 +388,13 @@ void PhotorealisticMapper::maintain(std::optional<double> progress, Executor& ex
   prune(options_.densification, scene_depth_, model_);
 }
 
-KeyframeComparison PhotorealisticMapper::compare_newest(Executor& executor) {
-  PHOTOSLAM_CHECK(has_keyframes(), "a comparison needs a keyframe");
-  const size_t newest = views_.size() - 1;
-  render_picture(newest, executor);
-  apply(views_[newest].exposure.exposure(), render_);
-  return {to_rgb(views_[newest].picture.color), to_u8(to_image(render_)), newest_features_};
+KeyframeComparison PhotorealisticMapper::compare(size_t keyframe, Executor& executor) {
+  PHOTOSLAM_CHECK(keyframe < views_.size(), "keyframe {} of {}", keyframe, views_.size());
+  render_picture(keyframe, executor);
+  apply(views_[keyframe].exposure.exposure(), render_);
+  const bool newest = keyframe + 1 == views_.size();
+  return {to_rgb(views_[keyframe].picture.color), to_u8(to_image(render_)),
+          newest ? newest_features_ : std::vector<DepthPixel>()};
 }
 
 FrozenMap PhotorealisticMapper::freeze() const {

@@ -79,7 +79,7 @@ struct FrozenMap {
 struct KeyframeComparison {
   ImageU8 picture;                   ///< RGB
   ImageU8 render;                    ///< RGB, what the map shows there now.
-  std::vector<DepthPixel> features;  ///< Of the keyframe, in pixels of the full picture.
+  std::vector<DepthPixel> features;  ///< In pixels of the full picture; of the newest keyframe only.
 };
 
 /// Photorealistic mapping (paper, Sec. 3.3 and 3.4): trains the gaussians of the hyper primitives map on keyframe
@@ -111,8 +111,8 @@ class PhotorealisticMapper {
   /// refinement is done; empty while frames arrive.
   splatting::StepResult train(std::optional<double> progress, Executor& executor);
 
-  /// There must be a keyframe.
-  KeyframeComparison compare_newest(Executor& executor);
+  /// Of a keyframe that still has its picture.
+  KeyframeComparison compare(size_t keyframe, Executor& executor);
 
   /// Whether the next iterations go to keyframes where a correction of the map left seams.
   bool has_seams() const { return schedule_.is_revisiting(); }

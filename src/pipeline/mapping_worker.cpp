@@ -66,7 +66,7 @@ void MappingWorker::update_figures() {
   training_psnr = mapper_.training_psnr();
   if (!preview_ || !mapper_.has_keyframes() || since_comparison_.seconds() < kComparisonSeconds) return;
   since_comparison_.restart();
-  auto comparison = std::make_shared<const KeyframeComparison>(mapper_.compare_newest(executor_));
+  auto comparison = std::make_shared<const KeyframeComparison>(mapper_.compare(mapper_.num_keyframes() - 1, executor_));
   std::lock_guard lock(mutex_);
   comparison_ = std::move(comparison);
 }
