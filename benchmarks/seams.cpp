@@ -73,6 +73,7 @@ Status OpenLoop::measure(const std::filesystem::path& output) {
   while (const auto correction = closer.process(*map)) map = geometry_.correct(*correction);
   if (closer.loops().empty()) return error("no loop was found");
   seams_ = find_seams(options_.photorealistic_mapping.schedule.seam_px, header_.sensor.camera, *map, before);
+  std::erase_if(seams_, [&](int view) { return map->keyframe(KeyframeId(view)).keyframe.culled; });  // no picture
   const auto closing = static_cast<size_t>(closer.loops().front().now.value);
 
   const FrozenMap open = mapper_.freeze();
