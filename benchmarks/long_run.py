@@ -77,6 +77,9 @@ def main() -> None:
                 largest = 0.0
         report = json.loads(process.stdout.read())
     image, frames = report["image"], report["frames"]
+    if image["psnr_db"] is None:
+        print(f"stopped after {frames['total']} frames")
+        return
     print(f"all {frames['total']} frames: {image['psnr_db']:.2f} dB, worst 5 % {image['psnr_p5_db']:.2f} dB, lost "
           f"{frames['lost']}, peak memory {report['memory']['peak_rss_mb']:.0f} MB")
 
