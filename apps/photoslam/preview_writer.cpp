@@ -10,7 +10,7 @@
 namespace photoslam {
 namespace {
 
-constexpr double kInterval_s = 1.0;
+constexpr double kIntervalSeconds = 1.0;
 constexpr int kMargin = 12;  // pixels around the trajectory
 
 void copy_into(const ImageU8& image, int x0, ImageU8& target) {
@@ -74,7 +74,7 @@ ImageU8 compose_preview(const Progress& progress) {
 }
 
 void PreviewWriter::show(const Progress& progress) {
-  if (path_.empty() || !progress.comparison || (!first_ && since_last_.seconds() < kInterval_s)) return;
+  if (path_.empty() || !progress.comparison || (!first_ && since_last_.seconds() < kIntervalSeconds)) return;
   first_ = false;
   since_last_.restart();
   const Status status = write_png(path_, compose_preview(progress));

@@ -37,8 +37,9 @@ RgbdFrame look_at_wall(int index) {
       for (uint32_t channel = 0; channel < 3; ++channel) {
         int sum = 0;
         for (int s = 0; s < 9; ++s) {
-          const double x = (u + (s % 3 - 1) / 3.0 - kCamera.cx) / kCamera.fx * kWallDepth + kStep * index;
-          const double y = (v + (s / 3 - 1) / 3.0 - kCamera.cy) / kCamera.fy * kWallDepth;
+          const int column = s % 3 - 1, row = s / 3 - 1;
+          const double x = (u + column / 3.0 - kCamera.cx) / kCamera.fx * kWallDepth + kStep * index;
+          const double y = (v + row / 3.0 - kCamera.cy) / kCamera.fy * kWallDepth;
           sum += wall(x, y, channel);
         }
         frame.rgb.push_back(static_cast<uint8_t>(sum / 9));

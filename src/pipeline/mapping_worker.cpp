@@ -19,7 +19,7 @@ void MappingWorker::freeze_if_due() {
   online_ = mapper_.freeze();
 }
 
-void MappingWorker::handle(MappingMessage message) {
+void MappingWorker::handle(const MappingMessage& message) {
   freeze_if_due();
   if (message.update.map && !message.update.keyframe.valid()) {
     mapper_.update_poses(*message.update.map);

@@ -34,7 +34,7 @@ class MappingWorker {
  public:
   MappingWorker(const SystemOptions& options, const RunSettings& settings, MapperSensor sensor, Executor& executor);
 
-  void handle(MappingMessage message);
+  void handle(const MappingMessage& message);
   /// Trains once; false when there is nothing to train on.
   bool train_while_idle();
   /// Freezes the online map at the first opportunity after this time.

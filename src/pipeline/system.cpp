@@ -243,7 +243,7 @@ void Session::close_remaining_loops() {
 Stage<MappingMessage>::Work Session::mapping_work() {
   Stage<MappingMessage>::Work work;
   work.name = "photorealistic mapping";
-  work.handle = [this](MappingMessage message) { mapping_.handle(std::move(message)); };
+  work.handle = [this](const MappingMessage& message) { mapping_.handle(message); };
   if (!logical_time_ && !settings_.localize_only) work.idle = [this] { return mapping_.train_while_idle(); };
   work.on_start = in_background;
   return work;
