@@ -25,8 +25,8 @@ def main() -> None:
     parser.add_argument("output", type=pathlib.Path)
     parser.add_argument("--map-until", type=float, default=10.0)
     parser.add_argument("--sensor", default="auto")
-    parser.add_argument("--near-m", type=float, default=0.3)
-    parser.add_argument("--near-deg", type=float, default=15.0)
+    parser.add_argument("--near-m", type=float, default=0.1)
+    parser.add_argument("--near-deg", type=float, default=5.0)
     parser.add_argument("--deterministic", action="store_true")
     a = parser.parse_args()
     command = [a.program, "run", str(a.sequence), "--sensor", a.sensor, "--map-until", str(a.map_until), "--output",
