@@ -7,6 +7,7 @@ PHOTOSLAM_BINARY is the program, PHOTOSLAM_SEQUENCE a short RGB-D sequence in th
 PHOTOSLAM_SOURCE_DIR the root of the source tree.
 """
 
+import csv
 import hashlib
 import json
 import os
@@ -360,15 +361,45 @@ class RunTest(CommandLineTest):
         (output / "run.json").write_text(json.dumps(description), encoding="utf-8")
         self.assert_fails(photoslam("eval", output, "--poses", "truth"), 1, "--truth")
 
-    def test_training_from_random_gaussians_has_no_other_seeds(self):
-        output = self.run_deterministic("run", "--iterations-per-frame", "1")
+    def train(self, *arguments):
+        """Gaussians of the map that `train` writes, and the PSNR of the views it was trained on."""
         trained = self.folder / "trained"
-        result = photoslam("train", "--poses", output, "--init", "random:100", "--iterations", "1", "--output", trained)
+        result = photoslam("train", *arguments, "--output", trained)
         self.assertEqual(result.returncode, 0, result.stderr)
-        header = (trained / "map.ply").read_bytes()[:200].decode("ascii", "replace")
+        header = (trained / "map.ply").read_bytes()[:400].decode("ascii", "replace")
         count = int(re.search(r"element vertex (\d+)", header)[1])
-        self.assertGreater(count, 0)
-        self.assertLessEqual(count, 100)
+        return count, float(re.search(r"trained views\s+PSNR ([\d.]+)", result.stdout)[1])
+
+    def test_training_from_random_gaussians_adds_to_them_by_splitting_and_cloning(self):
+        run = self.run_deterministic("run", "--iterations-per-frame", "1")
+        begin, blind = self.train("--poses", run, "--init", "random:500", "--iterations", "1")
+        self.assertGreater(begin, 400)
+        self.assertLessEqual(begin, 500, "no other seeds")
+        grown, trained = self.train("--poses", run, "--init", "random:500", "--iterations", "400")
+        self.assertGreater(grown, begin)
+        self.assertGreater(trained, blind + 6)
+
+    def test_training_from_the_map_of_the_run_improves_it(self):
+        run = self.run_deterministic("run", "--iterations-per-frame", "2")
+        begin, before = self.train("--poses", run, "--init", run / "map.ply", "--iterations", "1")
+        _, after = self.train("--poses", run, "--init", run / "map.ply", "--iterations", "250")
+        self.assertGreater(begin, 1000)
+        self.assertGreater(after, before)
+
+    def test_eval_counts_only_what_the_beginning_saw(self):
+        output = self.run_deterministic("run")
+        table = self.folder / "scores.csv"
+        result = photoslam("eval", output, "--seen-until", "0.2", "--table", table)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with table.open(encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        start = float(rows[0]["timestamp"])
+        shares = {float(row["timestamp"]) - start: float(row["share"]) for row in rows}
+        self.assertTrue(all(share == 1 for time, share in shares.items() if time <= 0.2))
+        later = [share for time, share in shares.items() if time > 0.2]
+        self.assertTrue(all(0 < share < 1 for share in later), later)
+        self.assertGreater(later[0], later[-1], "the camera moves on")
+        self.assert_fails(photoslam("eval", output, "--seen-until", "-1"), 2, "--seen-until")
 
     def test_exports_for_other_programs(self):
         run = self.run_deterministic("run")

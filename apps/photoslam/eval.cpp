@@ -4,12 +4,14 @@
 
 #include <map>
 #include <memory>
+#include <set>
 #include <thread>
 
 #include "base/file.h"
 #include "commands.h"
 #include "evaluation/map_scoring.h"
 #include "evaluation/run_evaluation.h"
+#include "evaluation/seen_surfaces.h"
 #include "result_table.h"
 #include "run_folder.h"
 #include "sources/ground_truth.h"
@@ -25,7 +27,16 @@ struct EvalArguments {
   std::string frames = "all";
   std::string poses = "estimate";
   fs::path table;
+  double seen_until = 0;
   bool json = false;
+};
+
+/// What a run has left in its folder, and the truth about its trajectory where there is any.
+struct FinishedRun {
+  RunDescription description;
+  FrameLog log;
+  Trajectory estimate, online;
+  std::optional<Trajectory> truth;
 };
 
 /// Whether a frame of the log is among those asked for.
@@ -57,8 +68,38 @@ Result<Trajectory> true_poses(const Trajectory& estimate, const std::optional<Tr
   return aligned(poses, estimate_from_truth);
 }
 
-Result<std::vector<FrameScore>> score_run(const EvalArguments& arguments, const RunDescription& description,
-                                          FrameSource& source, const FrameLog& log, const Trajectory& trajectory) {
+/// The first seconds have seen what they show; of later frames those pixels count whose surface those seconds saw, by
+/// true poses. Frames without a true pose are not scored.
+void count_only_seen(double seconds, const FinishedRun& run, double metres_per_depth_unit, ScoringTask& task) {
+  std::map<int64_t, SE3> pose_at;
+  for (const auto& [own, theirs] : associate(run.estimate, *run.truth)) {
+    pose_at[run.estimate[own].timestamp_ns] = (*run.truth)[theirs].world_from_camera.inverse();
+  }
+  std::map<FrameId, SE3> poses;
+  std::set<FrameId> early;
+  for (const FrameRecord& frame : run.log) {
+    const auto pose = pose_at.find(frame.timestamp_ns);
+    const auto id = static_cast<size_t>(frame.frame.value);
+    if (pose != pose_at.end()) {
+      poses[frame.frame] = pose->second;
+      if (1e-9 * static_cast<double>(frame.timestamp_ns - run.log.front().timestamp_ns) <= seconds)
+        early.insert(frame.frame);
+    } else if (id < task.camera_from_world.size()) {
+      task.camera_from_world[id].reset();
+    }
+  }
+  auto seen = std::make_shared<SeenSurfaces>(run.description.camera, metres_per_depth_unit);
+  task.mask = [seen, poses = std::move(poses), early = std::move(early)](FrameId id, const ImageU16& depth) {
+    const auto pose = poses.find(id);
+    if (pose == poses.end()) return ImageU8();
+    if (!early.contains(id)) return seen->mask(pose->second, depth);
+    seen->add_view(pose->second, depth);
+    return ImageU8();
+  };
+}
+
+Result<std::vector<FrameScore>> score_run(const EvalArguments& arguments, const FinishedRun& run, FrameSource& source,
+                                          const Trajectory& poses) {
   const auto table = read_gaussian_ply(arguments.folder / "map.ply");
   if (!table) return table.error();
   const auto exposures = read_run_exposures(arguments.folder);
@@ -67,11 +108,11 @@ Result<std::vector<FrameScore>> score_run(const EvalArguments& arguments, const 
   const std::vector<SE3> world = {SE3{}};
 
   std::map<int64_t, SE3> pose_at;
-  for (const StampedPose& pose : trajectory) pose_at[pose.timestamp_ns] = pose.world_from_camera.inverse();
+  for (const StampedPose& pose : poses) pose_at[pose.timestamp_ns] = pose.world_from_camera.inverse();
   ScoringTask task{&model, world, {}};
-  for (const FrameRecord& frame : log) {
+  for (const FrameRecord& frame : run.log) {
     const auto pose = pose_at.find(frame.timestamp_ns);
-    if (pose == pose_at.end() || !is_chosen(frame, arguments.frames, description.hold_out)) continue;
+    if (pose == pose_at.end() || !is_chosen(frame, arguments.frames, run.description.hold_out)) continue;
     const auto id = static_cast<size_t>(frame.frame.value);
     if (task.camera_from_world.size() <= id) {
       task.camera_from_world.resize(id + 1);
@@ -80,52 +121,72 @@ Result<std::vector<FrameScore>> score_run(const EvalArguments& arguments, const 
     task.camera_from_world[id] = pose->second;
     task.exposures[id] = nearest_exposure(*exposures, frame.timestamp_ns);
   }
+  if (arguments.seen_until > 0) {
+    if (!run.truth || source.info().sensor != SensorKind::rgbd) {
+      return error("--seen-until needs measured depth and a true trajectory; {} lacks {}",
+                   run.description.dataset.string(), run.truth ? "depth images" : "the trajectory (--truth)");
+    }
+    count_only_seen(arguments.seen_until, run, source.info().metres_per_depth_unit, task);
+  }
   ThreadPool executor(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
   return score_maps(source, std::span(&task, 1), {}, executor).front().scores;
 }
 
 std::string as_csv(const std::vector<FrameScore>& scores) {
-  std::string csv = "frame,timestamp,psnr_db,ssim\n";
+  std::string csv = "frame,timestamp,psnr_db,ssim,share\n";
   for (const FrameScore& s : scores) {
-    csv += fmt::format("{},{:.9f},{:.4f},{:.5f}\n", s.frame.value, 1e-9 * static_cast<double>(s.timestamp_ns),
-                       s.psnr_db, s.ssim);
+    csv += fmt::format("{},{:.9f},{:.4f},{:.5f},{:.4f}\n", s.frame.value, 1e-9 * static_cast<double>(s.timestamp_ns),
+                       s.psnr_db, s.ssim, s.share);
   }
   return csv;
 }
 
+Result<FinishedRun> read_run(const EvalArguments& arguments) {
+  FinishedRun run;
+  const auto take = [](auto read, auto& target) -> Status {
+    if (!read) return read.error();
+    target = std::move(*read);
+    return {};
+  };
+  const fs::path& folder = arguments.folder;
+  if (Status s = take(read_run_description(folder), run.description); !s) return s.error();
+  if (Status s = take(read_tum_trajectory(folder / "trajectory.tum"), run.estimate); !s) return s.error();
+  if (Status s = take(read_tum_trajectory(folder / "trajectory_online.tum"), run.online); !s) return s.error();
+  if (Status s = take(read_frame_log(folder / "frames.csv"), run.log); !s) return s.error();
+  const auto truth =
+      arguments.truth.empty() ? find_ground_truth(run.description.dataset) : std::optional(arguments.truth);
+  if (!truth) return run;
+  if (Status s = take(read_ground_truth(*truth), run.truth); !s) return s.error();
+  if (!absolute_error(run.estimate, *run.truth, false)) {
+    return error("{}: fewer than three poses within 20 ms of those of {}", truth->string(),
+                 (folder / "trajectory.tum").string());
+  }
+  return run;
+}
+
 Status eval(const EvalArguments& arguments) {
-  const auto description = read_run_description(arguments.folder);
-  if (!description) return description.error();
+  HtmlReport html;
   auto report = read_report(arguments.folder / "report.json");
   if (!report) return report.error();
-  const auto estimate = read_tum_trajectory(arguments.folder / "trajectory.tum");
-  if (!estimate) return estimate.error();
-  const auto online = read_tum_trajectory(arguments.folder / "trajectory_online.tum");
-  if (!online) return online.error();
-  const auto log = read_frame_log(arguments.folder / "frames.csv");
-  if (!log) return log.error();
+  html.report = std::move(*report);
+  const auto run = read_run(arguments);
+  if (!run) return run.error();
 
-  auto source = open_source(description->dataset, description->source);
+  SourceOptions options = run->description.source;
+  auto source = open_source(run->description.dataset, options);
   if (!source) return source.error();
   const bool with_scale = (*source)->info().sensor == SensorKind::mono;
-
-  HtmlReport html;
-  html.report = std::move(*report);
-  std::optional<Trajectory> truth;
-  const auto found = arguments.truth.empty() ? find_ground_truth(description->dataset) : std::optional(arguments.truth);
-  if (found) {
-    auto read = read_ground_truth(*found);
-    if (!read) return read.error();
-    truth = std::move(*read);
-    evaluate_trajectories(*estimate, *online, *truth, with_scale, html);
-    if (!html.report.ate.rmse_m) {
-      return error("{}: fewer than three poses within 20 ms of those of {}", found->string(),
-                   (arguments.folder / "trajectory.tum").string());
-    }
+  if (arguments.seen_until > 0) {  // depth that the run did not use tells what was seen
+    options.sensor.reset();
+    source = open_source(run->description.dataset, options);
+    if (!source) return source.error();
   }
-  const auto poses = arguments.poses == "truth" ? true_poses(*estimate, truth, with_scale) : estimate;
+  if (run->truth) evaluate_trajectories(run->estimate, run->online, *run->truth, with_scale, html);
+
+  const auto poses = arguments.poses == "truth" ? true_poses(run->estimate, run->truth, with_scale)
+                                                : Result<Trajectory>(run->estimate);
   if (!poses) return poses.error();
-  const auto scores = score_run(arguments, *description, **source, *log, *poses);
+  const auto scores = score_run(arguments, *run, **source, *poses);
   if (!scores) return scores.error();
   if (scores->empty()) return error("{}: no frames to score among '{}'", arguments.folder.string(), arguments.frames);
   if (!arguments.table.empty()) {
@@ -154,7 +215,13 @@ void add_eval(CommandLine& line) {
                   "one alignment: what better poses alone would change")
       ->check(CLI::IsMember({"estimate", "truth"}))
       ->capture_default_str();
-  command.add_option("--table", arguments->table, "Also write PSNR and SSIM of each frame to this CSV file");
+  command
+      .add_option("--seen-until", arguments->seen_until,
+                  "Of the frames after the first so many seconds count only the pixels whose surface was seen in them, "
+                  "by measured depth and true poses: how a map made of the beginning generalises [s]")
+      ->check(CLI::Range(0.0, 1e9));
+  command.add_option("--table", arguments->table,
+                     "Also write of each frame PSNR, SSIM and the share of its pixels that count to this CSV file");
   command.add_flag("--json", arguments->json, "Print JSON instead of the table");
   line.on_run(command, [arguments] { return eval(*arguments); });
 }

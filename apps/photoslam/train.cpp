@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <memory>
 #include <thread>
 
@@ -12,6 +13,7 @@
 #include "config_arguments.h"
 #include "evaluation/image_score.h"
 #include "evaluation/map_scoring.h"
+#include "evaluation/statistics.h"
 #include "image/convert.h"
 #include "interrupt.h"
 #include "io/gaussian_ply.h"
@@ -118,17 +120,35 @@ Result<PosedImages> read_run(const fs::path& run) {
   return result;
 }
 
-/// Gaussians of random place and colour where the cameras look.
+/// The part of the world that was photographed: all points but stray ones or, without points, as far around what the
+/// cameras look at as they are from it.
+Eigen::AlignedBox3d scene_box(const PosedImages& input) {
+  Eigen::AlignedBox3d box;
+  if (input.points.empty()) {
+    const Vec3 focus = focus_point(input.poses);
+    double radius = 0;
+    for (const SE3& pose : input.poses) radius = std::max(radius, (pose * focus).norm());
+    return {focus - Vec3::Constant(radius), focus + Vec3::Constant(radius)};
+  }
+  constexpr double kStray = 0.01;  // share at either end of each axis
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const SparsePoint& point : input.points) values.push_back(point.position[axis]);
+    box.min()[axis] = percentile(values, kStray);
+    box.max()[axis] = percentile(values, 1 - kStray);
+  }
+  return box;
+}
+
+/// Gaussians of random place and colour in the scene.
 std::vector<splatting::Gaussian> random_gaussians(const PosedImages& input, int count, uint64_t seed) {
-  const Vec3 focus = focus_point(input.poses);
-  double radius = 0;
-  for (const SE3& pose : input.poses) radius = std::max(radius, (pose * focus).norm());
+  const Eigen::AlignedBox3d box = scene_box(input);
   Random random(seed);
   std::vector<splatting::Gaussian> gaussians(static_cast<size_t>(count));
-  const double spacing = 2 * radius / std::cbrt(static_cast<double>(count));
+  const double spacing = std::cbrt(box.volume() / count);
   for (splatting::Gaussian& g : gaussians) {
     for (int i = 0; i < 3; ++i) {
-      g.mean[i] = static_cast<float>(focus[i] + random.uniform(-radius, radius));
+      g.mean[i] = static_cast<float>(random.uniform(box.min()[i], box.max()[i]));
       g.log_scale[i] = static_cast<float>(std::log(0.5 * spacing));
       g.sh[0][i] = static_cast<float>(random.uniform(-1.0, 1.0));
     }
@@ -153,13 +173,20 @@ Result<std::vector<splatting::Gaussian>> initial_gaussians(const TrainArguments&
   return gaussians;
 }
 
-/// Nothing but splitting and cloning adds to the gaussians to begin with, as in offline training.
+/// Offline training as in 3D gaussian splatting: nothing but splitting and cloning adds to the gaussians to begin with,
+/// only transparent ones are pruned, since the first ones are large and few are in front, and poses stay as they are.
 void densify_only(PhotorealisticOptions& options) {
   options.depth.enabled = false;
   options.seeding.dense = false;
+  options.seeding.active_features = false;
   options.seeding.inactive_features = false;
   options.reseed_interval = 0;
+  options.poses.enabled = false;
   options.densification.enabled = true;
+  options.densification.interval = 100;
+  options.densification.min_opacity = 0.005;
+  options.densification.max_scale = 100;
+  options.densification.min_weight = 0;
 }
 
 bool is_held_out(const TrainArguments& arguments, size_t i) {
@@ -254,9 +281,7 @@ Status train(const TrainArguments& arguments) {
   for (size_t i = 0; i < input->poses.size(); ++i) {
     if (!is_held_out(arguments, i)) poses.push_back(input->poses[i]);
   }
-  if (start->empty()) {
-    for (const SparsePoint& point : input->points) points.push_back(point.position);
-  }
+  for (const SparsePoint& point : input->points) points.push_back(point.position);
   const auto map = posed_map(input->camera, poses, points);
   fmt::print(stderr, "{} images {}x{}, {} of them to train on\n", input->images.size(), input->camera.width,
              input->camera.height, poses.size());

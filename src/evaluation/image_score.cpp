@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluation/image_score.h"
 
-#include <numeric>
+#include <algorithm>
+#include <functional>
 
 #include "image/convert.h"
 #include "image/metrics.h"
@@ -12,7 +13,10 @@ namespace photoslam {
 FrameScore score_frame(FrameId frame, int64_t timestamp_ns, const ImageF& render, const ImageU8& truth,
                        const ImageU8& mask) {
   const ImageF picture = to_float(render.channels() == 3 ? to_rgb(truth) : truth);
-  return {frame, timestamp_ns, psnr(render, picture, mask), ssim(render, picture, mask)};
+  const auto counted = mask.empty() ? 1.0
+                                    : static_cast<double>(std::ranges::count_if(mask.values(), std::identity())) /
+                                          static_cast<double>(mask.values().size());
+  return {frame, timestamp_ns, psnr(render, picture, mask), ssim(render, picture, mask), counted};
 }
 
 ImageFigures summarize(const std::vector<FrameScore>& scores) {

@@ -18,6 +18,7 @@ struct FrameScore {
   int64_t timestamp_ns = 0;
   double psnr_db = 0;
   double ssim = 0;
+  double share = 1;  ///< Of the pixels, those that count.
 };
 
 /// Figures over a set of frames.

@@ -21,6 +21,7 @@ struct Job {
   SE3 camera_from_world;
   splatting::Exposure exposure;
   const ImageU8* truth = nullptr;
+  ImageU8 mask;  // empty: the camera's
   bool keep_pair = false;
   // Results.
   FrameScore score;
@@ -42,7 +43,7 @@ struct Worker {
     job.render_ms = clock.milliseconds();
     apply(job.exposure, result);
     const ImageF image = to_image(result);
-    job.score = score_frame(job.frame, job.timestamp_ns, image, *job.truth, mask);
+    job.score = score_frame(job.frame, job.timestamp_ns, image, *job.truth, job.mask.empty() ? mask : job.mask);
     if (job.keep_pair) job.render = to_u8(image);
   }
 };
@@ -82,7 +83,9 @@ std::vector<MapScores> score_maps(FrameSource& source, std::span<const ScoringTa
   while (auto frame = source.next()) {
     if (!frame->defect.empty() || frame->color.empty()) continue;
     images.push_back(to_rgb(rectifier.color(std::move(frame->color))));
+    const ImageU16 depth = rectifier.depth(std::move(frame->depth));
     for (size_t task = 0; task < tasks.size(); ++task) {
+      ImageU8 chosen = tasks[task].mask ? tasks[task].mask(frame->id, depth) : ImageU8();
       const auto& poses = tasks[task].camera_from_world;
       const auto id = static_cast<size_t>(frame->id.value);
       if (id >= poses.size() || !poses[id]) continue;
@@ -93,6 +96,7 @@ std::vector<MapScores> score_maps(FrameSource& source, std::span<const ScoringTa
                       .camera_from_world = *poses[id],
                       .exposure = tasks[task].exposures.empty() ? splatting::Exposure{} : tasks[task].exposures[id],
                       .truth = &images.back(),
+                      .mask = std::move(chosen),
                       .keep_pair = keep,
                       .score = {},
                       .render = {}});

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -19,6 +20,9 @@ struct ScoringTask {
   std::span<const SE3> anchors_from_world;            // [anchors of gaussians]
   std::vector<std::optional<SE3>> camera_from_world;  ///< [frames of the source] by FrameId; nothing: not scored.
   std::vector<splatting::Exposure> exposures = {};    ///< The same; empty: all are identity.
+  /// Asked for every frame in turn, with its undistorted depth where there is one: which pixels count (0: not). An
+  /// empty mask: all of which the camera has data.
+  std::function<ImageU8(FrameId, const ImageU16& depth)> mask = {};
 };
 
 struct MapScores {

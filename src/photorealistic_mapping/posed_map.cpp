@@ -51,6 +51,17 @@ void observe(const PinholeCamera& camera, std::span<const Vec3> points, Keyframe
   if (!depths.empty()) view.median_depth = lower_median(depths);
 }
 
+/// Largest distance of a camera from the mean of all.
+double spread(std::span<const SE3> cameras_from_world) {
+  Vec3 mean = Vec3::Zero();
+  for (const SE3& pose : cameras_from_world) {
+    mean += pose.inverse().translation / static_cast<double>(cameras_from_world.size());
+  }
+  double radius = 0;
+  for (const SE3& pose : cameras_from_world) radius = std::max(radius, (pose * mean).norm());
+  return radius;
+}
+
 /// Larger for cameras that are likelier to see the same.
 double nearness(const SE3& a_from_world, const SE3& b_from_world, double depth) {
   const SE3 a_from_b = a_from_world * b_from_world.inverse();
@@ -103,12 +114,14 @@ Vec3 focus_point(std::span<const SE3> cameras_from_world) {
 std::shared_ptr<const MapSnapshot> posed_map(const PinholeCamera& camera, std::span<const SE3> cameras_from_world,
                                              std::span<const Vec3> points) {
   const Vec3 focus = focus_point(cameras_from_world);
+  // Cameras that look outwards have what they look at nowhere near the focus, but some way off as seen from their walk.
+  const double nearest = std::max(0.1 * spread(cameras_from_world), 1e-6);
   std::vector<std::shared_ptr<KeyframeView>> views;
   for (const SE3& pose : cameras_from_world) {
     auto view = std::make_shared<KeyframeView>();
     view->keyframe.id = KeyframeId(static_cast<int32_t>(views.size()));
     view->keyframe.camera_from_world = pose;
-    view->median_depth = std::max((pose * focus).z(), 1e-6);
+    view->median_depth = std::max((pose * focus).z(), nearest);
     observe(camera, points, *view);
     views.push_back(std::move(view));
   }

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <vector>
 
 namespace photoslam {
@@ -40,6 +41,16 @@ TEST(PosedMap, WithoutPointsNearCamerasAreCovisible) {
   const auto map = posed_map(kCamera, poses, {});
   EXPECT_EQ(map->keyframe(KeyframeId(0)).covisible.front().keyframe, KeyframeId(2));
   EXPECT_NEAR(map->keyframe(KeyframeId(0)).median_depth, 5.0, 0.1);
+}
+
+TEST(PosedMap, CamerasThatLookOutwardsSeeSomethingSomeWayOff) {
+  std::vector<SE3> poses;
+  for (const double angle : {0.0, 2.1, 4.2}) {
+    const Vec3 center(std::sin(angle), 0, std::cos(angle));
+    poses.push_back(look_at(center, 2 * center));
+  }
+  const auto map = posed_map(kCamera, poses, {});
+  for (const auto& view : map->keyframes) EXPECT_GT(view->median_depth, 0.09) << "a tenth of the walk";
 }
 
 TEST(FocusPoint, IsWhereTheAxesMeet) {

@@ -153,6 +153,7 @@ splatting::Gaussian make_disc(const SeedingOptions& options, const Vec3& mean, c
 
 void SeedingOptions::visit(OptionVisitor& v) {
   v.value({"dense", "", 0, 0, "One gaussian per image cell where depth is known, beyond the paper."}, dense);
+  v.value({"active_features", "", 0, 0, "Gaussians at features with a landmark."}, active_features);
   v.value(
       {"inactive_features", "", 0, 0, "Geometry-based densification: gaussians at features without a landmark too."},
       inactive_features);
@@ -212,7 +213,7 @@ std::vector<splatting::Gaussian> seed_features(const SeedingOptions& options, co
   const size_t plane = static_cast<size_t>(view.camera.width) * static_cast<size_t>(view.camera.height);
   std::vector<splatting::Gaussian> seeds;
   for (const DepthPixel& feature : features) {
-    if (!feature.active && !options.inactive_features) continue;
+    if (!(feature.active ? options.active_features : options.inactive_features)) continue;
     const Vec2 pixel((static_cast<double>(feature.x) + 0.5) / factor - 0.5,
                      (static_cast<double>(feature.y) + 0.5) / factor - 0.5);
     const int x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));

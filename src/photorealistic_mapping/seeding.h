@@ -15,6 +15,7 @@ namespace photoslam {
 
 struct SeedingOptions {
   bool dense = true;
+  bool active_features = true;
   bool inactive_features = true;
   int cell_px = 8;
   double sigma_cells = 0.7;
