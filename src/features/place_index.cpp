@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "base/check.h"
 #include "base/random.h"
@@ -45,29 +46,32 @@ PlaceIndex::PlaceIndex() {
 
 void PlaceIndex::add(int place, std::span<const Descriptor> descriptors) {
   PHOTOSLAM_CHECK(place >= 0, "{}", place);
+  if (descriptors.empty()) return;
   const auto p = static_cast<size_t>(place);
-  if (p >= known_.size()) {
-    known_.resize(p + 1, 0);
+  if (p >= keys_.size()) {
+    keys_.resize(p + 1);
     visited_.resize(p + 1, 0);
     score_.resize(p + 1, 0);
   }
-  num_places_ += !known_[p];
-  known_[p] = 1;
-  for (Table& table : tables_) {
-    for (const Descriptor& descriptor : descriptors) {
-      table.buckets[gather_bits(descriptor, table.key_bits)].push_back(
-          {place, gather_bits(descriptor, table.signature_bits)});
+  num_places_ += keys_[p].empty();
+  for (const Descriptor& descriptor : descriptors) {
+    Keys& keys = keys_[p].emplace_back();
+    for (size_t t = 0; t < kTables; ++t) {
+      Table& table = tables_[t];
+      keys[t] = static_cast<uint16_t>(gather_bits(descriptor, table.key_bits));
+      table.buckets[keys[t]].push_back({place, gather_bits(descriptor, table.signature_bits)});
     }
   }
 }
 
 void PlaceIndex::remove(int place) {
   const auto p = static_cast<size_t>(place);
-  if (place < 0 || p >= known_.size() || !known_[p]) return;
-  known_[p] = 0;
+  if (place < 0 || p >= keys_.size() || keys_[p].empty()) return;
   --num_places_;
-  for (Table& table : tables_) {
-    for (auto& bucket : table.buckets) std::erase_if(bucket, [place](const Entry& e) { return e.place == place; });
+  for (const Keys& keys : std::exchange(keys_[p], {})) {
+    for (size_t t = 0; t < kTables; ++t) {
+      std::erase_if(tables_[t].buckets[keys[t]], [place](const Entry& e) { return e.place == place; });
+    }
   }
 }
 

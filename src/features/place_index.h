@@ -30,8 +30,15 @@ class PlaceIndex {
   /// Adds descriptors of a place; places are numbered from 0 without large gaps. The 300 of strongest response do: with
   /// them the five best of 1000 places hold the revisited one in 98 % of the revisits that brute force finds.
   void add(int place, std::span<const Descriptor> descriptors);
-  /// Forgets a place.
+  /// Forgets a place; costs about what adding it did.
   void remove(int place);
+  /// Forgets all places for which the predicate holds.
+  template <class Predicate>
+  void remove_if(Predicate&& predicate) {
+    for (size_t place = 0; place < keys_.size(); ++place) {
+      if (!keys_[place].empty() && predicate(static_cast<int>(place))) remove(static_cast<int>(place));
+    }
+  }
   int num_places() const { return num_places_; }
 
   /// The most similar places, best first, at most `count`; only those that `accept` (all when empty).
@@ -54,10 +61,11 @@ class PlaceIndex {
   void find_similar(const Descriptor& descriptor);
 
   std::array<Table, kTables> tables_;
-  std::vector<uint8_t> known_;     // [places]
-  std::vector<uint32_t> visited_;  // [places] last query descriptor that found it
-  std::vector<double> score_;      // [places]
-  std::vector<int> similar_;       // Places found by one query descriptor.
+  using Keys = std::array<uint16_t, kTables>;  // of one descriptor
+  std::vector<std::vector<Keys>> keys_;        // [places] of what was added; empty: not known
+  std::vector<uint32_t> visited_;              // [places] last query descriptor that found it
+  std::vector<double> score_;                  // [places]
+  std::vector<int> similar_;                   // Places found by one query descriptor.
   uint32_t visit_ = 0;
   int num_places_ = 0;
 };

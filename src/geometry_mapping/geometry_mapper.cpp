@@ -85,12 +85,6 @@ void GeometryMapper::serialize(Archive& archive) {
   archive(recent_landmarks_);
 }
 
-/// The landmark, or the one that replaced it; invalid when it is dead.
-LandmarkId GeometryMapper::living(LandmarkId id) const {
-  while (id.valid() && !map_.landmark(id).view.alive) id = map_.landmark(id).view.replaced_by;
-  return id;
-}
-
 void GeometryMapper::insert(const KeyframeProposal& proposal) {
   if (const auto& initial = proposal.initial) {
     map_.add_keyframe(initial->id, initial->frame, initial->camera_from_world);
@@ -107,7 +101,7 @@ void GeometryMapper::insert(const KeyframeProposal& proposal) {
   if (proposal.reference.valid()) map_.set_parent(proposal.id, map_.living(proposal.reference));
   for (const auto& [id, sighting] : proposal.sightings) map_.count_sightings(id, sighting.visible, sighting.found);
   for (size_t i = 0; i < proposal.landmarks.size(); ++i) {
-    const LandmarkId id = living(proposal.landmarks[i]);
+    const LandmarkId id = map_.living(proposal.landmarks[i]);
     if (id.valid() && map_.add_observation(id, proposal.id, static_cast<int>(i))) map_.update_view(id);
   }
   for (const auto& [keypoint, seen] : proposal.same_as) {

@@ -65,7 +65,6 @@ class GeometryMapper {
  private:
   void insert(const KeyframeProposal& proposal);
   int cull_recent_landmarks(KeyframeId current);
-  LandmarkId living(LandmarkId id) const;
   double max_landmark_depth(const Keyframe& keyframe) const;
   int create_measured_landmarks(KeyframeId id);
   int triangulate_landmarks(KeyframeId id);

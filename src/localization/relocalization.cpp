@@ -40,6 +40,7 @@ void Relocalizer::update(const MapSnapshot& map) {
   for (; num_filed_ < static_cast<int>(map.keyframes.size()); ++num_filed_) {
     places_.add(num_filed_, strongest(map.keyframe(KeyframeId(num_filed_)).keyframe.frame->features));
   }
+  places_.remove_if([&](int place) { return map.keyframe(KeyframeId(place)).keyframe.culled; });
 }
 
 std::optional<Relocalization> Relocalizer::relocalize(const MapSnapshot& map, const FeatureFrame& frame,
@@ -47,7 +48,7 @@ std::optional<Relocalization> Relocalizer::relocalize(const MapSnapshot& map, co
   std::vector<KeyframeId> candidates;
   const auto propose = [&](KeyframeId id) {
     if (!map.has(id)) return;
-    id = map.living(id);  // what a culled one saw is seen from there
+    id = map.living(id);
     if (std::ranges::find(candidates, id) == candidates.end()) candidates.push_back(id);
   };
   propose(likely);

@@ -33,7 +33,7 @@ class Relocalizer {
   Relocalizer(const RelocalizationOptions& options, FrameAlignment alignment)
       : options_(options), alignment_(std::move(alignment)) {}
 
-  /// Files the keyframes that are new in the map.
+  /// Files the keyframes that are new in the map, and takes out those that were culled: others see what they saw.
   void update(const MapSnapshot& map);
 
   /// `likely` is tried first if it is in the map. update() must have seen the map.

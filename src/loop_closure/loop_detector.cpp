@@ -140,20 +140,19 @@ void LoopDetector::add(const MapSnapshot& map, KeyframeId id) {
   index_.add(id.value, strongest_descriptors(map.keyframe(id).keyframe.frame->features));
 }
 
-/// What a culled keyframe saw is seen from its parent.
+/// Culled keyframes are no places any more: others see what they saw.
 std::vector<KeyframeId> LoopDetector::similar_places(const MapSnapshot& map, const Keyframe& now) {
   const std::vector<Descriptor> descriptors = strongest_descriptors(now.frame->features);
   const std::set<KeyframeId> known = connected(map, now.id);
   const auto accept = [&](int place) {
-    const KeyframeId then = map.living(KeyframeId(place));
+    const KeyframeId then(place);
     const bool is_long_ago = now.id.value - then.value >= options_.min_keyframe_gap;
     return !known.contains(then) && (is_long_ago || map.root_of(then) != map.root_of(now.id));
   };
-  const auto num_candidates = static_cast<size_t>(options_.max_candidates);
+  index_.remove_if([&](int place) { return map.keyframe(KeyframeId(place)).keyframe.culled; });
   std::vector<KeyframeId> places;
-  for (const PlaceCandidate& candidate : index_.query(descriptors, index_.num_places(), accept)) {
-    const KeyframeId then = map.living(KeyframeId(candidate.place));
-    if (places.size() < num_candidates && std::ranges::find(places, then) == places.end()) places.push_back(then);
+  for (const PlaceCandidate& candidate : index_.query(descriptors, options_.max_candidates, accept)) {
+    places.emplace_back(candidate.place);
   }
   index_.add(now.id.value, descriptors);
   return places;

@@ -24,8 +24,7 @@ struct LandmarkView {
   double min_distance = 0;       ///< Range of camera distances [m] at which the descriptor's scale fits the pyramid.
   double max_distance = 0;
   Descriptor descriptor{};
-  bool alive = false;      ///< False after culling or fusion.
-  LandmarkId replaced_by;  ///< The landmark that took over its observations; invalid if it was culled.
+  bool alive = false;  ///< False after culling or fusion.
 };
 
 /// A geometric point of the hyper primitives map, owned by geometry mapping.

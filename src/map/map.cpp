@@ -47,10 +47,29 @@ Keyframe& Map::mutable_keyframe(KeyframeId id) {
   return keyframes_[static_cast<size_t>(id.value)];
 }
 
-Landmark& Map::mutable_landmark(LandmarkId id) {
+const Landmark& Map::landmark(LandmarkId id) const {
+  static const Landmark kDead;
+  const LandmarkSlot& slot = landmarks_[static_cast<size_t>(id.value)];
+  return slot.living ? *slot.living : kDead;
+}
+
+LandmarkId Map::living(LandmarkId id) const {
+  while (id.valid() && !landmarks_[static_cast<size_t>(id.value)].living) {
+    id = landmarks_[static_cast<size_t>(id.value)].replaced_by;
+  }
+  return id;
+}
+
+/// nullptr: it is dead.
+Landmark* Map::mutable_landmark(LandmarkId id) {
   PHOTOSLAM_CHECK(id.valid() && static_cast<size_t>(id.value) < landmarks_.size(), "landmark {}", id.value);
-  changed_chunks_.insert(id.value / MapSnapshot::kChunk);
-  return landmarks_[static_cast<size_t>(id.value)];
+  changed_chunks_.insert(id.value / LandmarkChunk::kSize);
+  return landmarks_[static_cast<size_t>(id.value)].living.get();
+}
+
+void Map::bury(LandmarkId id, LandmarkId replaced_by) {
+  changed_chunks_.insert(id.value / LandmarkChunk::kSize);
+  landmarks_[static_cast<size_t>(id.value)] = {nullptr, replaced_by};
 }
 
 Keyframe& Map::add_keyframe(KeyframeId id, std::shared_ptr<const FeatureFrame> frame, const SE3& camera_from_world) {
@@ -66,8 +85,7 @@ Keyframe& Map::add_keyframe(KeyframeId id, std::shared_ptr<const FeatureFrame> f
 
 LandmarkId Map::add_landmark(const Vec3& position, KeyframeId keyframe, int keypoint) {
   const LandmarkId id(static_cast<int32_t>(landmarks_.size()));
-  landmarks_.emplace_back();
-  Landmark& landmark = mutable_landmark(id);
+  Landmark& landmark = *landmarks_.emplace_back(std::make_unique<Landmark>()).living;
   landmark.view.position = position;
   landmark.view.alive = true;
   landmark.created_by = keyframe;
@@ -77,34 +95,36 @@ LandmarkId Map::add_landmark(const Vec3& position, KeyframeId keyframe, int keyp
 }
 
 bool Map::add_observation(LandmarkId id, KeyframeId keyframe_id, int keypoint) {
-  Landmark& landmark = mutable_landmark(id);
+  Landmark* landmark = mutable_landmark(id);
+  if (!landmark) return false;
   Keyframe& keyframe = mutable_keyframe(keyframe_id);
   LandmarkId& slot = keyframe.landmarks.at(static_cast<size_t>(keypoint));
   const bool seen =
-      std::ranges::any_of(landmark.observations, [&](const auto& o) { return o.keyframe == keyframe_id; });
-  if (!landmark.view.alive || seen || slot.valid()) return false;
+      std::ranges::any_of(landmark->observations, [&](const auto& o) { return o.keyframe == keyframe_id; });
+  if (seen || slot.valid()) return false;
   slot = id;
-  landmark.observations.push_back({keyframe_id, keypoint});
+  landmark->observations.push_back({keyframe_id, keypoint});
   return true;
 }
 
 void Map::remove_observation(LandmarkId id, KeyframeId keyframe) {
-  Landmark& landmark = mutable_landmark(id);
-  std::erase_if(landmark.observations, [&](const LandmarkObservation& o) {
+  Landmark* landmark = mutable_landmark(id);
+  if (!landmark) return;
+  std::erase_if(landmark->observations, [&](const LandmarkObservation& o) {
     if (o.keyframe != keyframe) return false;
     mutable_keyframe(keyframe).landmarks[static_cast<size_t>(o.keypoint)] = LandmarkId{};
     return true;
   });
-  if (landmark.observations.empty()) landmark.view.alive = false;
+  if (landmark->observations.empty()) bury(id);
 }
 
 void Map::erase_landmark(LandmarkId id) {
-  Landmark& landmark = mutable_landmark(id);
-  for (const auto& [keyframe, keypoint] : landmark.observations) {
+  const Landmark* landmark = mutable_landmark(id);
+  if (!landmark) return;
+  for (const auto& [keyframe, keypoint] : landmark->observations) {
     mutable_keyframe(keyframe).landmarks[static_cast<size_t>(keypoint)] = LandmarkId{};
   }
-  landmark.observations = std::vector<LandmarkObservation>();  // gives the memory back
-  landmark.view.alive = false;
+  bury(id);
 }
 
 void Map::fuse(LandmarkId from, LandmarkId to) {
@@ -113,17 +133,17 @@ void Map::fuse(LandmarkId from, LandmarkId to) {
   count_sightings(to, landmark(from).times_visible, landmark(from).times_found);
   erase_landmark(from);
   for (const auto& [keyframe, keypoint] : moved) add_observation(to, keyframe, keypoint);
-  mutable_landmark(from).view.replaced_by = to;
+  bury(from, to);
   update_view(to);
 }
 
 void Map::update_view(LandmarkId id) {
-  Landmark& landmark = mutable_landmark(id);
-  LandmarkView& view = landmark.view;
-  if (landmark.observations.empty()) return;
+  Landmark* landmark = mutable_landmark(id);
+  if (!landmark) return;
+  LandmarkView& view = landmark->view;
   Vec3 direction_sum = Vec3::Zero();
   std::vector<const Descriptor*> descriptors;
-  for (const auto& [keyframe_id, keypoint] : landmark.observations) {
+  for (const auto& [keyframe_id, keypoint] : landmark->observations) {
     const Keyframe& observer = keyframe(keyframe_id);
     direction_sum += (view.position - observer.camera_from_world.inverse().translation).normalized();
     descriptors.push_back(&observer.frame->features.descriptors[static_cast<size_t>(keypoint)]);
@@ -131,7 +151,7 @@ void Map::update_view(LandmarkId id) {
   view.normal = direction_sum.normalized();
   view.descriptor = most_central(descriptors);
 
-  const auto& [first_id, first_keypoint] = landmark.observations.front();
+  const auto& [first_id, first_keypoint] = landmark->observations.front();
   const Keyframe& first = keyframe(first_id);
   const double distance = (first.camera_from_world * view.position).norm();
   const int octave = first.frame->features.keypoints[static_cast<size_t>(first_keypoint)].octave;
@@ -139,7 +159,9 @@ void Map::update_view(LandmarkId id) {
   view.min_distance = view.max_distance / std::pow(scale_factor_, num_levels_ - 1);
 }
 
-void Map::set_position(LandmarkId id, const Vec3& position) { mutable_landmark(id).view.position = position; }
+void Map::set_position(LandmarkId id, const Vec3& position) {
+  if (Landmark* landmark = mutable_landmark(id)) landmark->view.position = position;
+}
 
 void Map::set_pose(KeyframeId id, const SE3& camera_from_world) {
   mutable_keyframe(id).camera_from_world = camera_from_world;
@@ -207,11 +229,11 @@ void Map::apply(const MapCorrection& correction) {
     if (!keyframe.culled) set_pose(keyframe.id, (Sim3(keyframe.camera_from_world) * move.inverse()).rigid());
   }
   for (size_t i = 0; i < landmarks_.size(); ++i) {
-    if (!landmarks_[i].view.alive) continue;
-    const KeyframeId reference =
-        std::ranges::min(landmarks_[i].observations, {}, &LandmarkObservation::keyframe).keyframe;
+    if (!landmarks_[i].living) continue;
+    const Landmark& landmark = *landmarks_[i].living;
+    const KeyframeId reference = std::ranges::min(landmark.observations, {}, &LandmarkObservation::keyframe).keyframe;
     const LandmarkId id(static_cast<int32_t>(i));
-    Vec3 position = moves[static_cast<size_t>(reference.value)] * landmarks_[i].view.position;
+    Vec3 position = moves[static_cast<size_t>(reference.value)] * landmark.view.position;
     if (const auto shift = correction.landmark_shifts.find(id); shift != correction.landmark_shifts.end()) {
       position += shift->second;
     }
@@ -236,19 +258,22 @@ void Map::append(const Map& other) {
     if (keyframe.culled) anchors_[keyframe.parent].push_back(keyframe.id);
     keyframes_.push_back(std::move(keyframe));
   }
-  for (Landmark landmark : other.landmarks_) {
-    count_on(landmark.view.replaced_by);
-    count_on(landmark.created_by);
-    for (LandmarkObservation& o : landmark.observations) count_on(o.keyframe);
-    changed_chunks_.insert(static_cast<int>(landmarks_.size()) / MapSnapshot::kChunk);
-    landmarks_.push_back(std::move(landmark));
+  for (const LandmarkSlot& theirs : other.landmarks_) {
+    changed_chunks_.insert(static_cast<int>(landmarks_.size()) / LandmarkChunk::kSize);
+    LandmarkSlot& slot = landmarks_.emplace_back(nullptr, theirs.replaced_by);
+    count_on(slot.replaced_by);
+    if (!theirs.living) continue;
+    slot.living = std::make_unique<Landmark>(*theirs.living);
+    count_on(slot.living->created_by);
+    for (LandmarkObservation& o : slot.living->observations) count_on(o.keyframe);
   }
 }
 
 void Map::count_sightings(LandmarkId id, int visible, int found) {
-  Landmark& landmark = landmarks_[static_cast<size_t>(id.value)];  // no reader sees the counters
-  landmark.times_visible += visible;
-  landmark.times_found += found;
+  Landmark* landmark = landmarks_[static_cast<size_t>(id.value)].living.get();  // no reader sees the counters
+  if (!landmark) return;
+  landmark->times_visible += visible;
+  landmark->times_found += found;
 }
 
 std::vector<CovisibleKeyframe> Map::covisible_keyframes(KeyframeId id, int min_shared) const {
@@ -277,12 +302,16 @@ std::shared_ptr<const MapSnapshot> Map::snapshot() {
         KeyframeView{current, covisible_keyframes(id, kMinCovisibleLandmarks), median_landmark_depth(*this, current)});
   }
   next->num_landmarks = static_cast<int>(landmarks_.size());
-  next->landmark_chunks.resize((landmarks_.size() + MapSnapshot::kChunk - 1) / MapSnapshot::kChunk);
+  next->landmark_chunks.resize((landmarks_.size() + LandmarkChunk::kSize - 1) / LandmarkChunk::kSize);
   for (const int chunk : changed_chunks_) {
-    auto copy = std::make_shared<MapSnapshot::LandmarkChunk>();
-    const size_t begin = static_cast<size_t>(chunk) * MapSnapshot::kChunk;
-    const size_t end = std::min(begin + MapSnapshot::kChunk, landmarks_.size());
-    for (size_t i = begin; i < end; ++i) (*copy)[i - begin] = landmarks_[i].view;
+    auto copy = std::make_shared<LandmarkChunk>();
+    const size_t begin = static_cast<size_t>(chunk) * LandmarkChunk::kSize;
+    const size_t end = std::min(begin + LandmarkChunk::kSize, landmarks_.size());
+    for (size_t i = begin; i < end; ++i) {
+      const auto slot = static_cast<int>(i - begin);
+      if (landmarks_[i].living) copy->add(slot, landmarks_[i].living->view);
+      if (landmarks_[i].replaced_by.valid()) copy->replace(slot, landmarks_[i].replaced_by);
+    }
     next->landmark_chunks[static_cast<size_t>(chunk)] = std::move(copy);
   }
   changed_keyframes_.clear();

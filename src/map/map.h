@@ -48,7 +48,10 @@ class Map {
   size_t num_keyframes() const { return keyframes_.size(); }
   size_t num_landmarks() const { return landmarks_.size(); }
   const Keyframe& keyframe(KeyframeId id) const { return keyframes_[static_cast<size_t>(id.value)]; }
-  const Landmark& landmark(LandmarkId id) const { return landmarks_[static_cast<size_t>(id.value)]; }
+  /// Of a dead one nothing is known any more.
+  const Landmark& landmark(LandmarkId id) const;
+  /// The landmark, or the one that took over its observations; invalid when it is dead.
+  LandmarkId living(LandmarkId id) const;
   /// Counts sightings by tracked frames.
   void count_sightings(LandmarkId id, int visible, int found);
   void set_parent(KeyframeId keyframe, KeyframeId parent) { mutable_keyframe(keyframe).parent = parent; }
@@ -73,12 +76,19 @@ class Map {
  private:
   Keyframe& mutable_keyframe(KeyframeId id);
   void tie(KeyframeId anchor, KeyframeId parent);
-  Landmark& mutable_landmark(LandmarkId id);
+  Landmark* mutable_landmark(LandmarkId id);
+  void bury(LandmarkId id, LandmarkId replaced_by = {});
+
+  /// Dead landmarks keep their id, but hardly any memory.
+  struct LandmarkSlot {
+    std::unique_ptr<Landmark> living;
+    LandmarkId replaced_by;
+  };
 
   double scale_factor_;
   int num_levels_;
   std::deque<Keyframe> keyframes_;
-  std::deque<Landmark> landmarks_;
+  std::deque<LandmarkSlot> landmarks_;
   std::map<KeyframeId, std::vector<KeyframeId>> anchors_;  // culled keyframes by their parents, which are not culled
   std::set<KeyframeId> changed_keyframes_;                 // since the last snapshot
   std::set<int> changed_chunks_;

@@ -11,9 +11,9 @@ void serialize(Archive& a, PixelObservation& o) { a(o.pixel, o.u_right, o.invers
 
 void serialize(Archive& a, LandmarkObservation& o) { a(o.keyframe, o.keypoint); }
 
-void serialize(Archive& a, Landmark& l) {
+void serialize(Archive& a, Landmark& l, LandmarkId& replaced_by) {
   LandmarkView& v = l.view;
-  a(v.position, v.normal, v.min_distance, v.max_distance, v.descriptor, v.alive, v.replaced_by);
+  a(v.position, v.normal, v.min_distance, v.max_distance, v.descriptor, v.alive, replaced_by);
   a(l.observations, l.created_by, l.times_visible, l.times_found);
 }
 
@@ -42,8 +42,13 @@ void Map::serialize(Archive& a, int image_width, int image_height) {
   }
   landmarks_.resize(a.count(landmarks_.size()));
   for (size_t i = 0; i < landmarks_.size(); ++i) {
-    a(landmarks_[i]);
-    if (a.reading()) changed_chunks_.insert(static_cast<int>(i) / MapSnapshot::kChunk);
+    LandmarkSlot& slot = landmarks_[i];
+    Landmark landmark;
+    if (!a.reading() && slot.living) landmark = *slot.living;
+    photoslam::serialize(a, landmark, slot.replaced_by);
+    if (!a.reading()) continue;
+    slot.living = landmark.view.alive ? std::make_unique<Landmark>(std::move(landmark)) : nullptr;
+    changed_chunks_.insert(static_cast<int>(i) / LandmarkChunk::kSize);
   }
 }
 

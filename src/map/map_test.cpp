@@ -49,13 +49,14 @@ TEST_F(MapTest, AppendedMapCountsOnFromItsOwnIds) {
   map.add_observation(seen, KeyframeId(3), 4);
   map.fuse(dead, seen);
   map.set_parent(KeyframeId(2), KeyframeId(1));
-  const Map other = map;
+  Map other(1.2, 8);
+  other.append(map);
   map.append(other);
   EXPECT_EQ(map.num_keyframes(), 8u);
   EXPECT_EQ(map.keyframe(KeyframeId(6)).parent, KeyframeId(5));
   EXPECT_FALSE(map.keyframe(KeyframeId(4)).parent.valid());
   EXPECT_EQ(map.keyframe(KeyframeId(5)).landmarks[2], LandmarkId(3));
-  EXPECT_EQ(map.landmark(LandmarkId(2)).view.replaced_by, LandmarkId(3));
+  EXPECT_EQ(map.living(LandmarkId(2)), LandmarkId(3));
   expect_consistent(map);
   const auto snapshot = map.snapshot();
   LandmarkId found(2);
@@ -108,19 +109,19 @@ TEST_F(MapTest, AFusedLandmarkIsFoundThroughItsSuccessor) {
 }
 
 TEST_F(MapTest, SnapshotsShareWhatDidNotChange) {
-  for (int i = 0; i < 3 * MapSnapshot::kChunk / 2; ++i) {
+  for (int i = 0; i < 3 * LandmarkChunk::kSize / 2; ++i) {
     const KeyframeId keyframe(i % 4);
     map.add_landmark(Vec3(0, 0, 3), keyframe, i / 4);
   }
   const auto first = map.snapshot();
-  map.set_position(LandmarkId(MapSnapshot::kChunk + 1), Vec3(1, 2, 3));
+  map.set_position(LandmarkId(LandmarkChunk::kSize + 1), Vec3(1, 2, 3));
   map.set_pose(KeyframeId(2), SE3{});
   const auto second = map.snapshot();
   EXPECT_EQ(first->landmark_chunks[0], second->landmark_chunks[0]);
   EXPECT_NE(first->landmark_chunks[1], second->landmark_chunks[1]);
   EXPECT_EQ(first->keyframes[1], second->keyframes[1]);
   EXPECT_NE(first->keyframes[2], second->keyframes[2]);
-  LandmarkId moved(MapSnapshot::kChunk + 1);
+  LandmarkId moved(LandmarkChunk::kSize + 1);
   EXPECT_EQ(second->find(moved)->position, Vec3(1, 2, 3));
 }
 

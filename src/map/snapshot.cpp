@@ -11,10 +11,10 @@ KeyframeId MapSnapshot::root_of(KeyframeId id) const {
 
 const LandmarkView* MapSnapshot::find(LandmarkId& id) const {
   while (id.valid() && id.value < num_landmarks) {
-    const auto chunk = static_cast<size_t>(id.value / kChunk);
-    const LandmarkView& view = (*landmark_chunks[chunk])[static_cast<size_t>(id.value % kChunk)];
-    if (view.alive) return &view;
-    id = view.replaced_by;
+    const LandmarkChunk& chunk = *landmark_chunks[static_cast<size_t>(id.value / LandmarkChunk::kSize)];
+    const int slot = id.value % LandmarkChunk::kSize;
+    if (const LandmarkView* view = chunk.find(slot)) return view;
+    id = chunk.replacement(slot);
   }
   return nullptr;
 }

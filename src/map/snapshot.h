@@ -2,12 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <memory>
 #include <vector>
 
 #include "map/keyframe.h"
-#include "map/landmark.h"
+#include "map/landmark_chunk.h"
 
 namespace photoslam {
 
@@ -28,13 +27,10 @@ struct KeyframeView {
 /// what changed.
 class MapSnapshot {
  public:
-  static constexpr int kChunk = 256;  ///< Landmarks per shared chunk.
-  using LandmarkChunk = std::array<LandmarkView, kChunk>;
-
   uint64_t version = 0;
   int num_corrections = 0;                                            ///< MapCorrections that have been applied.
   std::vector<std::shared_ptr<const KeyframeView>> keyframes;         ///< [K] by KeyframeId.
-  std::vector<std::shared_ptr<const LandmarkChunk>> landmark_chunks;  ///< By LandmarkId / kChunk.
+  std::vector<std::shared_ptr<const LandmarkChunk>> landmark_chunks;  ///< By LandmarkId / LandmarkChunk::kSize.
   int num_landmarks = 0;                                              ///< Ids given out, dead ones included.
 
   bool has(KeyframeId id) const { return id.valid() && static_cast<size_t>(id.value) < keyframes.size(); }

@@ -56,9 +56,11 @@ TEST(FeatureDepths, TakesTheBestSourceForEachFeature) {
   keyframe.camera_from_world.translation = Vec3(0, 0, 1);
   keyframe.landmarks = {LandmarkId(0), LandmarkId(), LandmarkId(), LandmarkId()};
   MapSnapshot map;
-  auto chunk = std::make_shared<MapSnapshot::LandmarkChunk>();
-  (*chunk)[0].alive = true;
-  (*chunk)[0].position = Vec3(0, 0, 3);
+  auto chunk = std::make_shared<LandmarkChunk>();
+  LandmarkView landmark;
+  landmark.alive = true;
+  landmark.position = Vec3(0, 0, 3);
+  chunk->add(0, landmark);
   map.landmark_chunks.push_back(chunk);
   map.num_landmarks = 1;
   DepthPicture picture{{64, 32, 50, 50, 32, 16}, {}, ImageF(64, 32)};

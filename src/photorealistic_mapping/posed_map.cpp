@@ -17,15 +17,17 @@ constexpr size_t kMaxCovisible = 12;
 /// Fills the landmarks of a snapshot; ids are the indices of the points.
 void add_landmarks(std::span<const Vec3> points, MapSnapshot& map) {
   map.num_landmarks = static_cast<int>(points.size());
-  std::shared_ptr<MapSnapshot::LandmarkChunk> chunk;
+  std::shared_ptr<LandmarkChunk> chunk;
   for (size_t i = 0; i < points.size(); ++i) {
-    if (i % MapSnapshot::kChunk == 0) {
-      chunk = std::make_shared<MapSnapshot::LandmarkChunk>();
+    const auto slot = static_cast<int>(i % LandmarkChunk::kSize);
+    if (slot == 0) {
+      chunk = std::make_shared<LandmarkChunk>();
       map.landmark_chunks.push_back(chunk);
     }
-    LandmarkView& view = (*chunk)[i % MapSnapshot::kChunk];
+    LandmarkView view;
     view.position = points[i];
     view.alive = true;
+    chunk->add(slot, view);
   }
 }
 
