@@ -30,7 +30,7 @@ class Loss : public ::testing::TestWithParam<int64_t> {
     return loss.evaluate(render, TargetImage(c.width, c.height, c.target, c.mask), lambda, exposure, executor,
                          gradient);
   }
-  testing::ScopedSimdTarget target_{GetParam()};
+  testing::ScopedSimdTarget simd_target{GetParam()};
 };
 
 INSTANTIATE_TEST_SUITE_P(Simd, Loss, ::testing::ValuesIn(testing::simd_targets()),

@@ -70,7 +70,7 @@ struct Adam {
 
 class Training : public ::testing::TestWithParam<int64_t> {
  protected:
-  testing::ScopedSimdTarget target_{GetParam()};
+  testing::ScopedSimdTarget simd_target{GetParam()};
   SerialExecutor executor_;
 };
 

@@ -35,7 +35,7 @@ double relative_error(const std::vector<double>& got, const std::vector<double>&
 
 class Engine : public ::testing::TestWithParam<int64_t> {
  protected:
-  testing::ScopedSimdTarget target_{GetParam()};
+  testing::ScopedSimdTarget simd_target{GetParam()};
   SerialExecutor executor_;
 };
 
