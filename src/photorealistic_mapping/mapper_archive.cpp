@@ -39,8 +39,8 @@ void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
   ImageU8 color;
   ImageU16 depth;
   if (!a.reading() && view->has_images()) {
-    color = color_of(view->targets[0]);
-    depth = depth_of(view->targets[0]);
+    color = color_of(view->target);
+    depth = depth_of(view->target);
   }
   serialize_image(a, color);
   serialize_image(a, depth);

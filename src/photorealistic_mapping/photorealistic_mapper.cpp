@@ -184,15 +184,18 @@ void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, c
   keep_image_budget();
 }
 
-double PhotorealisticMapper::TrainingView::megabytes() const {
-  size_t bytes = picture.color.values().size() + picture.depth.values().size_bytes() + right.values().size();
-  for (const splatting::TargetImage& target : targets)
-    bytes += target.planes().size() + target.mask().size() + target.depth().size_bytes();
+/// Of its pictures, with all levels that training may ask for.
+double PhotorealisticMapper::megabytes(const TrainingView& view) const {
+  const splatting::TargetImage& target = view.target;
+  size_t bytes = view.picture.color.values().size() + view.picture.depth.values().size_bytes() +
+                 view.right.values().size() + target.depth().size_bytes();
+  for (int level = 0; level <= schedule_.coarsest_level(); ++level)
+    bytes += static_cast<size_t>((target.width() >> level) * (target.height() >> level)) * (target.has_mask() ? 4 : 3);
   return 1e-6 * static_cast<double>(bytes);
 }
 
 void PhotorealisticMapper::TrainingView::drop_images() {
-  targets.clear();
+  target = {};
   picture = {};
   right = {};
 }
@@ -204,7 +207,7 @@ void PhotorealisticMapper::retire(size_t view) {
 
 /// The newest keyframe's pictures stay: the next one's depth may need them.
 void PhotorealisticMapper::keep_image_budget() {
-  const double fitting = options_.image_budget_mb / std::max(views_.back().megabytes(), 1e-6);
+  const double fitting = options_.image_budget_mb / std::max(megabytes(views_.back()), 1e-6);
   while (static_cast<double>(schedule_.active().size()) > std::max(fitting, 2.0)) {
     std::vector<SE3> poses;
     for (const int view : schedule_.active()) poses.push_back(view_from_world(static_cast<size_t>(view)));
@@ -215,15 +218,8 @@ void PhotorealisticMapper::keep_image_budget() {
 
 void PhotorealisticMapper::set_images(const ImageU8& color, const ImageU16& depth, TrainingView& view) const {
   const CameraView full{sensor_.camera, color, depth, sensor_.mask};
-  // Only a depth loss looks at the depths of smaller levels, and their medians cost more than all the colours.
-  const CameraView shrinking{full.camera, color, options_.depth_weight > 0 ? depth : ImageU16(), full.mask};
-  for (int level = 0; level <= schedule_.coarsest_level(); ++level) {
-    const CameraView small = level == 0 ? full : shrink(shrinking, 1 << level);
-    view.cameras.push_back(small.camera);
-    splatting::TargetImage& target =
-        view.targets.emplace_back(small.camera.width, small.camera.height, small.color.values(), small.mask.values());
-    if (!small.depth.empty()) target.set_depth(small.depth.values(), static_cast<float>(sensor_.metres_per_depth_unit));
-  }
+  view.target = {full.camera.width, full.camera.height, full.color.values(), full.mask.values()};
+  if (!depth.empty()) view.target.set_depth(depth.values(), static_cast<float>(sensor_.metres_per_depth_unit));
   view.picture = make_picture(full, sensor_.metres_per_depth_unit);
 }
 
@@ -346,13 +342,14 @@ splatting::TrainOptions PhotorealisticMapper::train_options(std::optional<double
 splatting::StepResult PhotorealisticMapper::train(std::optional<double> progress, Executor& executor) {
   const KeyframeSchedule::Choice choice = schedule_.next(progress.has_value());
   const auto index = static_cast<size_t>(choice.view);
-  const auto level = static_cast<size_t>(choice.level);
   TrainingView& view = views_[index];
   splatting::TrainOptions options = train_options(progress);
   options.exposure = view.exposure.exposure();
+  options.target_factor = 1 << choice.level;
   camera_from_anchors(view_from_world(index), anchors_from_world_, camera_from_anchor_);
-  const splatting::StepResult result = trainer_.step(model_, {to_splatting(view.cameras[level]), camera_from_anchor_},
-                                                     view.targets[level], options, executor);
+  const splatting::Camera camera = to_splatting(shrink(sensor_.camera, options.target_factor));
+  const splatting::StepResult result =
+      trainer_.step(model_, {camera, camera_from_anchor_}, view.target, options, executor);
 
   // The first keyframe defines the world, and what is bright in it.
   if (choice.view > 0) {

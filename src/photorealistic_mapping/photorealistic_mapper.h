@@ -133,13 +133,11 @@ class PhotorealisticMapper {
   struct TrainingView {
     PoseAdjustment adjustment;  // photometric correction of the keyframe's pose
     ExposureAdjustment exposure;
-    bool exposure_is_known = false;      // from elsewhere; the map is not asked
-    std::vector<PinholeCamera> cameras;  // [levels + 1]
-    std::vector<splatting::TargetImage> targets;
+    bool exposure_is_known = false;  // from elsewhere; the map is not asked
+    splatting::TargetImage target;
     DepthPicture picture;  // half the size, for seeding
     ImageU8 right;         // stereo: grey, half the size
-    bool has_images() const { return !targets.empty(); }
-    double megabytes() const;
+    bool has_images() const { return !target.empty(); }
     void drop_images();
   };
 
@@ -147,6 +145,7 @@ class PhotorealisticMapper {
   splatting::RenderOptions render_options() const;
   splatting::TrainOptions train_options(std::optional<double> progress) const;
   void set_images(const ImageU8& color, const ImageU16& depth, TrainingView& view) const;
+  double megabytes(const TrainingView& view) const;
   void retire(size_t view);
   void release_culled(const MapSnapshot& map);
   void keep_image_budget();

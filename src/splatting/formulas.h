@@ -13,16 +13,9 @@
 
 #include <math.h>
 
+#include "base/formula.h"
 #include "splatting/anchor_view.h"
 #include "splatting/gaussian.h"
-
-#ifndef PHOTOSLAM_FORMULA
-#ifdef __CUDACC__
-#define PHOTOSLAM_FORMULA __host__ __device__ inline
-#else
-#define PHOTOSLAM_FORMULA inline
-#endif
-#endif
 
 #ifdef HWY_NAMESPACE
 HWY_BEFORE_NAMESPACE();

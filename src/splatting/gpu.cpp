@@ -116,7 +116,7 @@ struct TargetHandle {
 };
 
 template <class State>
-cuda::DeviceTarget device_target(const std::shared_ptr<State>& state, const TargetImage& target) {
+cuda::DeviceTarget device_target(const std::shared_ptr<State>& state, const TargetImage& target, int factor) {
   using Handle = TargetHandle<State>;
   auto handle = std::static_pointer_cast<Handle>(target.remote());
   if (handle == nullptr || handle->gpu.lock() != state) {
@@ -125,6 +125,9 @@ cuda::DeviceTarget device_target(const std::shared_ptr<State>& state, const Targ
   }
   cuda::DeviceTarget device;
   device.id = handle->id;
+  device.width = target.width();
+  device.height = target.height();
+  device.factor = factor;
   device.rgb = target.planes().data();
   device.mask = target.has_mask() ? target.mask().data() : nullptr;
   device.depth = target.has_depth() ? target.depth().data() : nullptr;
@@ -140,20 +143,20 @@ StageTimes stage_times(const cuda::Figures& figures) {
   return {at(0), at(1), at(2), at(3), at(4), at(5)};
 }
 
-StepResult step_result(const cuda::Figures& figures, const TargetImage& target, const TrainOptions& options) {
+StepResult step_result(const cuda::Figures& figures, const TrainOptions& options) {
   StepResult result;
   LossSums sums[3];
   for (int c = 0; c < 3; ++c) {
     const cuda::ChannelSums& channel = figures.channels[c];
     sums[c] = {channel.l1, options.ssim_weight > 0 ? channel.ssim : 0, channel.mse, channel.value, channel.bias};
   }
-  const PhotometricLoss photometric = summarize(sums, target.num_valid(), options.ssim_weight, options.exposure);
+  const PhotometricLoss photometric = summarize(sums, figures.num_valid, options.ssim_weight, options.exposure);
   result.l1 = photometric.l1;
   result.ssim = photometric.ssim;
   result.mse = photometric.mse;
   std::copy_n(photometric.exposure_gradient, 6, result.exposure_gradient);
-  if (options.depth_weight > 0 && target.num_depth() > 0)
-    result.depth = static_cast<float>(figures.depth / target.num_depth());
+  if (options.depth_weight > 0 && figures.num_depth > 0)
+    result.depth = static_cast<float>(figures.depth / figures.num_depth);
   result.loss = photometric.loss + options.depth_weight * result.depth;
   result.visible = static_cast<int>(figures.visible);
   std::transform(figures.pose, figures.pose + 6, result.pose_gradient, [](double v) { return static_cast<float>(v); });
@@ -233,11 +236,11 @@ std::optional<StepResult> Gpu::step(GaussianModel& model, const View& view, cons
     std::copy_n(options.exposure.gain, 3, loss.gain);
     std::copy_n(options.exposure.bias, 3, loss.bias);
     loss.ssim_weight = options.ssim_weight;
-    loss.depth_weight = target.num_depth() > 0 ? options.depth_weight : 0;
-    const cuda::Figures figures = state_->engine->step(on_device, device_target(state_, target), loss,
-                                                       make_update_constants(options), options.update);
+    loss.depth_weight = options.depth_weight;
+    const cuda::Figures figures = state_->engine->step(on_device, device_target(state_, target, options.target_factor),
+                                                       loss, make_update_constants(options), options.update);
     if (options.update) model.trained_remotely();
-    result = step_result(figures, target, options);
+    result = step_result(figures, options);
     state_->busy_ms += result->times.total();
   });
   return result;

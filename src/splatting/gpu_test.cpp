@@ -77,14 +77,17 @@ Scene small_scene(uint64_t seed) {
   return scene;
 }
 
-TargetImage make_target(const Scene& scene, uint64_t seed) {
+/// What the scene's view should look like, at `factor` times its resolution and a rest.
+TargetImage make_target(const Scene& scene, uint64_t seed, int factor = 1) {
   Random random(seed);
-  std::vector<uint8_t> rgb(3 * scene.plane()), mask(scene.plane());
-  std::vector<float> depth(scene.plane());
+  const int width = factor * (scene.width + 1) - 1, height = factor * (scene.height + 1) - 1;
+  const auto pixels = static_cast<size_t>(width * height);
+  std::vector<uint8_t> rgb(3 * pixels), mask(pixels);
+  std::vector<float> depth(pixels);
   for (uint8_t& v : rgb) v = static_cast<uint8_t>(random.index(256));
   for (uint8_t& v : mask) v = random.uniform() < 0.9 ? 255 : 0;
   for (float& d : depth) d = random.uniform() < 0.7 ? static_cast<float>(random.uniform(1, 4)) : 0.0f;
-  TargetImage target(scene.width, scene.height, rgb, mask);
+  TargetImage target(width, height, rgb, mask);
   target.set_depth(depth);
   return target;
 }
@@ -168,15 +171,41 @@ void expect_training_as_on_the_cpu(const std::shared_ptr<Gpu>& gpu) {
   expect_close(there.model, here.model, 2e-3);
 }
 
+/// Of images and models, and whatever part of the target's resolution.
+void expect_steps_of_any_size_as_on_the_cpu(const std::shared_ptr<Gpu>& gpu) {
+  SerialExecutor executor;
+  Random random(65);
+  for (int round = 0; round < 12; ++round) {
+    Scene scene;
+    scene.width = 1 + random.index(66);
+    scene.height = 1 + random.index(50);
+    scene.count = round < 2 ? round : 1 + random.index(150);
+    scene.anchors = 1 + random.index(3);
+    scene.build(static_cast<uint64_t>(round));
+    TrainOptions options = train_options(scene);
+    options.update = false;
+    options.target_factor = 1 + random.index(4);
+    const TargetImage target = make_target(scene, 66, options.target_factor);
+    Trainer cpu, remote(gpu);
+    const StepResult want = cpu.step(scene.model, scene.view, target, options, executor);
+    expect_close(remote.step(scene.model, scene.view, target, options, executor), want);
+    const RenderResult &got = remote.rendered(), &image = cpu.rendered();
+    for (size_t k = 0; k < image.rgb.size(); ++k) ASSERT_NEAR(got.rgb[k], image.rgb[k], 1e-5f) << round;
+    for (size_t k = 0; k < image.alpha.size(); ++k) ASSERT_NEAR(got.alpha[k], image.alpha[k], 1e-5f) << round;
+  }
+}
+
 TEST(Gpu, TrainsAsTheCpuDoes) {
   FragileEngine::Faults fate;
   expect_training_as_on_the_cpu(make_gpu(fate));
+  expect_steps_of_any_size_as_on_the_cpu(make_gpu(fate));
 }
 
 TEST(Gpu, OfThisMachineTrainsAsTheCpuDoes) {
   const auto gpu = Gpu::open(1000);
   if (!gpu) GTEST_SKIP() << gpu.error().message;
   expect_training_as_on_the_cpu(*gpu);
+  expect_steps_of_any_size_as_on_the_cpu(*gpu);
   EXPECT_EQ((*gpu)->failure(), "");
 }
 

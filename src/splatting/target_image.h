@@ -37,11 +37,18 @@ class TargetImage {
   int num_valid() const { return num_valid_; }
   int num_depth() const { return num_depth_; }
 
+  /// The image at 1/factor of its resolution, as shrink() in image/pyramid.h makes it: when first asked for, its depth
+  /// when that is first asked for. For one thread at a time.
+  const TargetImage& shrunk(int factor, bool with_depth) const;
+
   /// What a GPU remembers of this image: lives as long as the image stays as it is.
   const std::shared_ptr<void>& remote() const { return remote_; }
   void set_remote(std::shared_ptr<void> remote) const { remote_ = std::move(remote); }
 
  private:
+  TargetImage shrink_color(int factor) const;
+  std::vector<uint16_t> shrink_depth(int factor) const;
+
   int width_ = 0, height_ = 0;
   std::vector<uint8_t> planes_;
   std::vector<uint8_t> mask_;
@@ -50,6 +57,7 @@ class TargetImage {
   int num_valid_ = 0;
   int num_depth_ = 0;
   mutable std::shared_ptr<void> remote_;
+  mutable std::vector<std::shared_ptr<TargetImage>> smaller_;  // by factor; null: nobody has asked
 };
 
 }  // namespace photoslam::splatting

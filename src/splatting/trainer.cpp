@@ -31,8 +31,11 @@ Trainer& Trainer::operator=(Trainer&&) noexcept = default;
 
 StepResult Trainer::step(GaussianModel& model, const View& view, const TargetImage& target, const TrainOptions& options,
                          Executor& executor) {
-  PHOTOSLAM_CHECK(target.width() == view.camera.width && target.height() == view.camera.height,
-                  "target {}x{}, camera {}x{}", target.width(), target.height(), view.camera.width, view.camera.height);
+  const int factor = options.target_factor;
+  PHOTOSLAM_CHECK(
+      factor >= 1 && target.width() / factor == view.camera.width && target.height() / factor == view.camera.height,
+      "target {}x{}, shrunk by {}, camera {}x{}", target.width(), target.height(), factor, view.camera.width,
+      view.camera.height);
   State& s = *state_;
   s.gpu_drew = s.image_unread = false;
   if (s.gpu) {
@@ -48,16 +51,17 @@ StepResult Trainer::step(GaussianModel& model, const View& view, const TargetIma
   result.visible = s.rendered.visible;
 
   Stopwatch watch;
+  const TargetImage& compared = target.shrunk(factor, options.depth_weight > 0);
   const PhotometricLoss photometric =
-      s.loss.evaluate(s.rendered.rgb, target, options.ssim_weight, options.exposure, executor, s.dl_drgb);
+      s.loss.evaluate(s.rendered.rgb, compared, options.ssim_weight, options.exposure, executor, s.dl_drgb);
   result.l1 = photometric.l1;
   result.ssim = photometric.ssim;
   result.mse = photometric.mse;
   std::copy_n(photometric.exposure_gradient, 6, result.exposure_gradient);
   ImageGradient gradient{s.dl_drgb, {}, {}};
-  if (options.depth_weight > 0 && target.num_depth() > 0) {
+  if (options.depth_weight > 0 && compared.num_depth() > 0) {
     result.depth =
-        depth_loss(s.rendered.depth, s.rendered.alpha, target, options.depth_weight, s.dl_ddepth, s.dl_dalpha);
+        depth_loss(s.rendered.depth, s.rendered.alpha, compared, options.depth_weight, s.dl_ddepth, s.dl_dalpha);
     gradient.depth = s.dl_ddepth;
     gradient.alpha = s.dl_dalpha;
   }

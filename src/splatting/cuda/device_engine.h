@@ -41,9 +41,12 @@ struct DeviceView {
   uint32_t num_anchors = 0;
 };
 
-/// A target image in the host's memory. It stays on the device under its id, as long as there is room.
+/// A target image in the host's memory, and the part of its resolution to compare at: 1/factor. Both stay on the device
+/// under its id, as long as there is room.
 struct DeviceTarget {
   uint64_t id = 0;
+  int width = 0, height = 0;
+  int factor = 1;
   const uint8_t* rgb = nullptr;     // [3, H, W]
   const uint8_t* mask = nullptr;    // [H, W] or null
   const uint16_t* depth = nullptr;  // [H, W] or null
@@ -67,9 +70,10 @@ struct Figures {
   uint32_t instances = 0;  ///< (gaussian, tile) pairs …
   uint32_t lost = 0;       ///< … and those that even all the memory allowed had no room for.
   ChannelSums channels[3] = {};
-  double depth = 0;     ///< Σ |D − A d|
-  double pose[6] = {};  ///< dL/dξ
-  float times[6] = {};  ///< Project, sort, forward, loss, backward, update [ms]
+  int num_valid = 0, num_depth = 0;  ///< Pixels compared, and those with depth that was.
+  double depth = 0;                  ///< Σ |D − A d|
+  double pose[6] = {};               ///< dL/dξ
+  float times[6] = {};               ///< Project, sort, forward, loss, backward, update [ms]
 };
 
 /// Host memory for a rendered image, or null: [3, H, W], [H, W], [H, W].
@@ -111,7 +115,7 @@ class DeviceEngine {
   virtual uint64_t peak_bytes() const = 0;
 };
 
-inline constexpr int kModuleVersion = 2;
+inline constexpr int kModuleVersion = 3;
 
 /// What the module exports as "photoslam_cuda_module".
 struct Module {

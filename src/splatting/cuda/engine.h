@@ -49,6 +49,7 @@ class Engine final : public DeviceEngine {
  private:
   template <class T>
   using Buffer = Array<T, Device>;
+  using Target = typename TargetCache<Device>::Entry;
   enum Mark { kStart, kProjected, kSorted, kBlended, kCompared, kUnblended, kUpdated };
 
   static int blocks_for(size_t items, int threads) {
@@ -61,13 +62,14 @@ class Engine final : public DeviceEngine {
     return {splats_.data(), tile_pairs_.values(), instance_slots_.data(), tile_begin_.data(), bucket_begin_.data()};
   }
 
+  Buffer<Block> make_blocks(uint32_t count);
   void draw(const DeviceView& view, bool keep);
   void begin(const DeviceView& view);
   void project();
   void list_instances();
   void blend(bool keep);
-  void compare(const DeviceTarget& target, const DeviceLoss& loss);
-  void compare_depth(const TargetOnDevice& target, const DeviceTarget& host, float weight);
+  void compare(const Target& target, const DeviceLoss& loss);
+  void compare_depth(const Target& target, float unit, float weight);
   void unblend(bool with_depth, bool with_alpha);
   void update_model(const UpdateConstants& constants, bool update, float* dense);
   Figures read_figures(Mark last);
@@ -105,6 +107,15 @@ class Engine final : public DeviceEngine {
   Buffer<float> ssim_derivatives_{memory_}, loss_sums_{memory_}, depth_sums_{memory_}, pose_{memory_}, dense_{memory_};
 };
 
+/// Blocks are copied as a whole, so all of them is initialised.
+template <class Device>
+Array<Block, Device> Engine<Device>::make_blocks(uint32_t count) {
+  Buffer<Block> blocks(memory_);
+  blocks.reserve(count);
+  device_.clear(blocks.data(), blocks.size() * sizeof(Block));
+  return blocks;
+}
+
 template <class Device>
 void Engine<Device>::arrange(const Arrangement& a) {
   const size_t slots = size_t{a.num_blocks} * kBlockSize;
@@ -117,7 +128,7 @@ void Engine<Device>::arrange(const Arrangement& a) {
   counts.take(a.num_blocks);
   records.take(size_t{a.num_records} * row::kTableRows);
   const bool in_place = !a.moves && a.num_blocks <= blocks_.size();
-  if (!in_place) target.reserve(a.num_blocks);
+  if (!in_place) target = make_blocks(a.num_blocks);
   device_.upload(sources.data(), a.sources, slots * sizeof(uint32_t));
   device_.upload(anchors.data(), a.anchors, a.num_blocks * sizeof(int32_t));
   device_.upload(counts.data(), a.counts, a.num_blocks * sizeof(int32_t));
@@ -145,8 +156,7 @@ void Engine<Device>::breed(const Child* children, uint32_t count) {
   list.take(count);
   device_.upload(list.data(), children, count * sizeof(Child));
   if (num_blocks_ + added > blocks_.size()) {
-    Buffer<Block> larger(memory_);
-    larger.reserve(num_blocks_ + added);
+    Buffer<Block> larger = make_blocks(num_blocks_ + added);
     device_.copy(larger.data(), blocks_.data(), num_blocks_ * sizeof(Block));
     std::swap(blocks_, larger);
   }
@@ -252,13 +262,12 @@ void Engine<Device>::draw(const DeviceView& view, bool keep) {
 }
 
 template <class Device>
-void Engine<Device>::compare(const DeviceTarget& host, const DeviceLoss& loss) {
-  const TargetOnDevice target = targets_.get(host, plane());
+void Engine<Device>::compare(const Target& target, const DeviceLoss& loss) {
   dl_drgb_.reserve(3 * plane());
   loss_sums_.reserve(size_t{3} * kLossSums * num_tiles());
   const Comparison images{rgb_.data(),
-                          target.rgb,
-                          target.mask,
+                          target.planes.rgb,
+                          target.planes.mask,
                           image_,
                           {loss.gain[0], loss.gain[1], loss.gain[2]},
                           {loss.bias[0], loss.bias[1], loss.bias[2]}};
@@ -271,22 +280,21 @@ void Engine<Device>::compare(const DeviceTarget& host, const DeviceLoss& loss) {
   } else {
     device_.clear(loss_sums_.data(), size_t{3} * kLossSums * num_tiles() * sizeof(float));
   }
-  const double values = 3.0 * std::max(host.num_valid, 1), weight = static_cast<double>(loss.ssim_weight);
+  const double values = 3.0 * std::max(target.num_valid, 1), weight = static_cast<double>(loss.ssim_weight);
   device_.launch(blocks, PhotometricKernel{images, derivatives, static_cast<float>((1 - weight) / values),
                                            static_cast<float>(weight / values), dl_drgb_.data(), loss_sums_.data()});
   device_.launch(3 * kLossSums, SumRows{loss_sums_.data(), image_.tiles(), &results_.data()->sums[0][0]});
-  if (loss.depth_weight > 0 && target.depth != nullptr) compare_depth(target, host, loss.depth_weight);
 }
 
 template <class Device>
-void Engine<Device>::compare_depth(const TargetOnDevice& target, const DeviceTarget& host, float weight) {
+void Engine<Device>::compare_depth(const Target& target, float unit, float weight) {
   const int blocks = blocks_for(plane(), DepthLossKernel::kThreads);
   dl_ddepth_.reserve(plane());
   dl_dalpha_.reserve(plane());
   depth_sums_.reserve(static_cast<size_t>(blocks));
-  device_.launch(blocks, DepthLossKernel{depth_.data(), alpha_.data(), target.depth, static_cast<int>(plane()),
-                                         host.depth_unit, weight / static_cast<float>(std::max(host.num_depth, 1)),
-                                         dl_ddepth_.data(), dl_dalpha_.data(), depth_sums_.data()});
+  device_.launch(blocks, DepthLossKernel{depth_.data(), alpha_.data(), target.planes.depth, static_cast<int>(plane()),
+                                         unit, weight / static_cast<float>(target.num_depth), dl_ddepth_.data(),
+                                         dl_dalpha_.data(), depth_sums_.data()});
   device_.launch(1, SumRows{depth_sums_.data(), blocks, &results_.data()->depth});
 }
 
@@ -338,7 +346,7 @@ template <class Device>
 bool Engine<Device>::has_lost_too_many(const Figures& figures, bool keep) {
   if (figures.lost == 0 || tolerate_lost_) return false;
   const uint32_t before = capacity_, wanted = figures.instances + figures.lost;
-  constexpr uint32_t kMost = 1u << 30;
+  constexpr uint32_t kMost = 1u << 28;
   capacity_ = std::min(wanted + wanted / 4, kMost);
   try {
     reserve_instances(keep);
@@ -391,16 +399,20 @@ Figures Engine<Device>::backward(const float* dl_drgb, const float* dl_ddepth, c
 template <class Device>
 Figures Engine<Device>::step(const DeviceView& view, const DeviceTarget& target, const DeviceLoss& loss,
                              const UpdateConstants& constants, bool update) {
-  const bool with_depth = loss.depth_weight > 0 && target.depth != nullptr;
   while (true) {
     draw(view, true);
-    compare(target, loss);
+    const Target& compared = targets_.get(target, target.factor, loss.depth_weight > 0);
+    const bool with_depth = loss.depth_weight > 0 && compared.num_depth > 0;
+    compare(compared, loss);
+    if (with_depth) compare_depth(compared, target.depth_unit, loss.depth_weight);
     device_.mark(kCompared);
     unblend(with_depth, with_depth);
     device_.mark(kUnblended);
     update_model(constants, update, nullptr);
     device_.mark(kUpdated);
-    const Figures figures = read_figures(kUpdated);
+    Figures figures = read_figures(kUpdated);
+    figures.num_valid = compared.num_valid;
+    figures.num_depth = compared.num_depth;
     if (!has_lost_too_many(figures, true)) return figures;
   }
 }

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numeric>
 
 #include "splatting/cuda/test_device.h"
@@ -46,6 +47,9 @@ struct OnDevice {
   }
   void draw() {
     figures = engine.forward(view, true);
+    read_image();
+  }
+  void read_image() {
     rgb.resize(3 * plane);
     depth.resize(plane);
     alpha.resize(plane);
@@ -282,6 +286,8 @@ struct Lesson {
     Random random(22);
     for (uint8_t& value : rgb) value = static_cast<uint8_t>(random.index(256));
     target.id = 1;
+    target.width = scene.width;
+    target.height = scene.height;
     target.rgb = rgb.data();
     target.num_valid = static_cast<int>(scene.plane());
     constants.beta1 = 0.9f;
@@ -476,6 +482,67 @@ TEST(CudaEngine, TargetsGiveWayWhenMemoryIsShort) {
   EXPECT_NO_THROW(device.engine.step(device.view, target, lesson.loss, lesson.constants, false));
 }
 
+/// What block (x, y) of an image, not 0 where it counts, holds.
+template <class T>
+std::vector<T> values_of_block(const T* plane, int width, int factor, int x, int y) {
+  std::vector<T> values;
+  for (int i = 0; i < factor * factor; ++i)
+    values.push_back(plane[(y * factor + i / factor) * width + x * factor + i % factor]);
+  return values;
+}
+
+TEST(CudaEngine, SmallerTargetsAreMadeOfBlocks) {
+  Random random(33);
+  TestDevice device;
+  Memory<TestDevice> memory(device, kPlenty);
+  TargetCache<TestDevice> cache(device, memory);
+  DeviceTarget target;
+  for (const auto& [width, height, factor] :
+       {std::tuple{8, 8, 8}, {37, 29, 2}, {50, 41, 3}, {67, 35, 4}, {90, 33, 8}}) {
+    const size_t pixels = static_cast<size_t>(width * height);
+    std::vector<uint8_t> rgb(3 * pixels), mask(pixels);
+    std::vector<uint16_t> depth(pixels);
+    for (uint8_t& value : rgb) value = static_cast<uint8_t>(random.index(256));
+    for (uint8_t& value : mask) value = random.uniform() < 0.03 ? 0 : 1;
+    for (uint16_t& value : depth)
+      value = static_cast<uint16_t>(random.uniform() < 0.45 ? 0 : random.index(random.index(2) == 0 ? 65536 : 4));
+    target = {.id = target.id + 1, .width = width, .height = height, .factor = factor, .rgb = rgb.data()};
+    target.mask = mask.data();
+    target.depth = depth.data();
+    const auto& got = cache.get(target, factor, true);
+    const int w = width / factor, h = height / factor;
+    ASSERT_EQ(got.size.width, w);
+    ASSERT_EQ(got.size.height, h);
+    const size_t small = static_cast<size_t>(w * h);
+    std::vector<uint8_t> got_rgb(3 * small), got_mask(small);
+    std::vector<uint16_t> got_depth(small);
+    device.download(got_rgb.data(), got.planes.rgb, 3 * small);
+    device.download(got_mask.data(), got.planes.mask, small);
+    device.download(got_depth.data(), got.planes.depth, 2 * small);
+    int num_valid = 0, num_depth = 0;
+    for (size_t i = 0; i < small; ++i) {
+      const int x = static_cast<int>(i) % w, y = static_cast<int>(i) / w;
+      for (size_t c = 0; c < 3; ++c) {
+        double sum = 0;
+        for (const uint8_t value : values_of_block(&rgb[c * pixels], width, factor, x, y)) sum += value;
+        ASSERT_EQ(got_rgb[c * small + i], std::floor(sum / (factor * factor) + 0.5)) << width << " " << i;
+      }
+      const std::vector<uint8_t> block = values_of_block(mask.data(), width, factor, x, y);
+      const bool valid = std::count(block.begin(), block.end(), 0) == 0;
+      std::vector<uint16_t> measured = values_of_block(depth.data(), width, factor, x, y);
+      std::erase(measured, 0);
+      std::sort(measured.begin(), measured.end());
+      const bool has_depth = valid && 2 * static_cast<int>(measured.size()) >= factor * factor;
+      ASSERT_EQ(got_mask[i] != 0, valid) << width << " " << i;
+      ASSERT_EQ(got_depth[i], has_depth ? measured[(measured.size() - 1) / 2] : 0) << width << " " << i;
+      num_valid += valid ? 1 : 0;
+      num_depth += has_depth ? 1 : 0;
+    }
+    EXPECT_EQ(got.num_valid, num_valid);
+    EXPECT_EQ(got.num_depth, num_depth);
+  }
+}
+
 TEST(CudaEngine, NothingToDrawIsTheBackground) {
   Scene scene;
   scene.count = 0;
@@ -492,6 +559,64 @@ TEST(CudaEngine, NothingToDrawIsTheBackground) {
   const Figures figures = device.engine.step(device.view, lesson.target, lesson.loss, lesson.constants, true);
   EXPECT_EQ(figures.visible, 0u);
   EXPECT_EQ(figures.pose[0], 0);
+}
+
+/// Gives a gaussian values that nobody can draw.
+void spoil(GaussianModel& model, size_t index, Random& random) {
+  constexpr float kNan = NAN, kInf = INFINITY;
+  constexpr std::pair<int, float> kValues[] = {
+      {row::kMean, kNan},     {row::kMean + 1, kInf}, {row::kMean + 2, -kInf}, {row::kMean, 1e30f},
+      {row::kRotation, kNan}, {row::kRotation, kInf}, {row::kLogScale, kNan},  {row::kLogScale + 1, 1e30f},
+      {row::kLogScale, kInf}, {row::kOpacity, kNan},  {row::kOpacity, kInf},   {row::kOpacity, -kInf},
+      {row::kSh, kNan},       {row::kSh + 47, kInf}};
+  const auto& [parameter, value] = kValues[random.index(std::size(kValues))];
+  model.block(index / kBlockSize).parameters[parameter][index % kBlockSize] = value;
+}
+
+/// Images of all sizes, models from empty to several blocks; what is not a number neither shows nor spreads.
+TEST(CudaEngine, GarbageIsAsGoodAsNothing) {
+  Random random(41);
+  for (int round = 0; round < 8; ++round) {
+    constexpr int kCounts[] = {0, 1, 2, 63, 64, 65, 90};
+    const int width = 1 + random.index(40), height = 1 + random.index(34), count = kCounts[random.index(7)];
+    const double share = round % 3 == 0 ? 1.0 : 0.3;
+    Scene spoilt, plain;
+    for (Scene* scene : {&spoilt, &plain}) {
+      scene->width = width;
+      scene->height = height;
+      scene->count = count;
+      scene->anchors = 1 + round % 2;
+      scene->build(static_cast<uint64_t>(round));
+    }
+    std::vector<uint8_t> is_spoilt(spoilt.model.index_end());
+    for (const size_t i : spoilt.indices) {
+      if (random.uniform() > share) continue;
+      is_spoilt[i] = 1;
+      spoil(spoilt.model, i, random);
+      plain.model.block(i / kBlockSize).parameters[row::kOpacity][i % kBlockSize] = -50;  // not to be seen
+    }
+    Lesson lesson(plain);
+    lesson.loss.ssim_weight = 0.2f;
+    OnDevice got(spoilt), want(plain);
+    const std::vector<float> before = got.rows();
+    const Figures a = got.engine.step(got.view, lesson.target, lesson.loss, lesson.constants, true);
+    const Figures b = want.engine.step(want.view, lesson.target, lesson.loss, lesson.constants, true);
+    got.read_image();
+    want.read_image();
+    EXPECT_EQ(got.rgb, want.rgb);
+    EXPECT_EQ(got.depth, want.depth);
+    EXPECT_EQ(got.alpha, want.alpha);
+    EXPECT_EQ(a.visible, b.visible);
+    EXPECT_EQ(a.instances, b.instances);
+    for (int i = 0; i < 6; ++i) EXPECT_EQ(a.pose[i], b.pose[i]);
+    const std::vector<float> after = got.rows(), plain_after = want.rows();
+    for (const size_t i : spoilt.indices)
+      for (int r = 0; r < row::kTableRows; ++r) {
+        const size_t at = OnDevice::row_at(i, r);
+        const float expected = is_spoilt[i] != 0 ? before[at] : plain_after[at];
+        ASSERT_EQ(std::memcmp(&after[at], &expected, sizeof(float)), 0) << round << ": " << i << " row " << r;
+      }
+  }
 }
 
 TEST(CudaEngine, ArrangementsMoveGaussiansWithAllThatBelongsToThem) {

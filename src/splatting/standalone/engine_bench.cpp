@@ -57,6 +57,8 @@ struct Setup {
     view.num_anchors = 1;
     for (size_t i = 0; i < rgb.size(); ++i) rgb[i] = static_cast<uint8_t>(i * 2654435761u >> 24);
     target.id = 1;
+    target.width = scene.width;
+    target.height = scene.height;
     target.rgb = rgb.data();
     target.num_valid = static_cast<int>(scene.plane());
     loss.ssim_weight = 0.2f;
