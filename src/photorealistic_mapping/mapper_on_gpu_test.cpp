@@ -200,6 +200,85 @@ TEST(MapperOnGpu, DoesWhatItDoesOnTheCpu) {
   EXPECT_GT(num_gaussians(mapper), 200u);
 }
 
+/// Two views of the same part of the wall, the second believed to be elsewhere.
+struct DoubledWall {
+  Story story{{64, 48, 56, 56, 33, 23}};
+  SE3 drift{Quat::Identity(), Vec3(0.7, 0, 0)};
+  SerialExecutor executor;
+
+  void show(Compared& mappers) {
+    for (const SE3& error : {SE3(), drift}) {
+      story.next_keyframe(error);
+      const auto id = KeyframeId(static_cast<int32_t>(mappers.remote.num_keyframes()));
+      mappers.both("a keyframe", [&](PhotorealisticMapper& m) {
+        m.add_keyframe(*story.map(), id, story.look(at(0), 1.0), executor);
+      });
+    }
+  }
+};
+
+TEST(MapperOnGpu, MergesWhatALoopHasDoubledAsOnTheCpu) {
+  for (const bool enabled : {true, false}) {
+    DoubledWall wall;
+    PhotorealisticOptions options;
+    options.seeding.cell_px = 8;
+    options.schedule.online_pixels = 1000000;
+    options.handover = false;
+    options.doubling.enabled = enabled;
+    options.doubling.max_distance = 3;  // seeds of a cell need not be at the same pixel
+    Compared mappers(options, wall.story.sensor());
+    wall.show(mappers);
+    const size_t before = num_gaussians(mappers.remote);
+    wall.story.correct({Sim3(), Sim3(wall.drift)});
+    mappers.both("a loop", [&](PhotorealisticMapper& m) { m.update_poses(*wall.story.map()); });
+    const size_t after = num_gaussians(mappers.remote);
+    EXPECT_EQ(after + 10 < before, enabled) << before << " " << after;
+  }
+}
+
+TEST(MapperOnGpu, RelocatesUnderTheCapAsOnTheCpu) {
+  for (const bool enabled : {true, false}) {
+    DoubledWall wall;
+    PhotorealisticOptions options;
+    options.seeding.cell_px = 8;
+    options.schedule.online_pixels = 1000000;
+    options.densification.relocation = enabled;
+    options.densification.max_gaussians = 80;
+    Compared mappers(options, wall.story.sensor());
+    wall.show(mappers);
+    EXPECT_EQ(num_gaussians(mappers.remote), 80u);
+    EXPECT_EQ(mappers.remote.gaussians().size(1) > 0, enabled) << "what is idle makes room, or nothing does";
+  }
+}
+
+TEST(MapperOnGpu, WeighsOpacityAsOnTheCpu) {
+  Story story({96, 72, 84, 84, 50, 34});
+  SerialExecutor executor;
+  double sums[2] = {};
+  for (const double weight : {0.0, 20.0}) {
+    PhotorealisticOptions options;
+    options.seeding.cell_px = 8;
+    options.schedule.online_pixels = 1000000;
+    options.opacity_weight = weight;
+    PhotorealisticMapper remote(options, story.sensor(), 1, make_gpu()), cpu(options, story.sensor(), 1);
+    if (weight == 0) story.next_keyframe(at(0));
+    for (PhotorealisticMapper* mapper : {&remote, &cpu}) {
+      mapper->add_keyframe(*story.map(), KeyframeId(0), story.look(at(0), 1.0), executor);
+      for (int i = 0; i < 3; ++i) mapper->train({}, executor);
+    }
+    ASSERT_EQ(num_gaussians(remote), num_gaussians(cpu));
+    cpu.gaussians().for_each([&](size_t i) {
+      const float want = cpu.gaussians().get(i).opacity_logit, got = remote.gaussians().get(i).opacity_logit;
+      // All gradients that count have the regulariser's sign: Adam's steps are equal.
+      if (weight > 0) {
+        EXPECT_NEAR(got, want, 2e-3f) << i;
+      }
+      sums[weight > 0 ? 1 : 0] += static_cast<double>(got);
+    });
+  }
+  EXPECT_LT(sums[1], sums[0] - 50) << "opacities have not fallen";
+}
+
 /// A short run that uses the GPU in every way: two keyframes, a correction, densification, drawing, saving.
 struct ShortRun {
   int iterations;
@@ -215,6 +294,7 @@ struct ShortRun {
     options.reseed_interval = 2;
     options.densification.interval = 3;
     options.densification.gradient_threshold = 5e-5;
+    options.depth_weight = 0.01;
     options.schedule.start_pixels = 24 * 18;
     options.schedule.online_pixels = 1000000;
     std::shared_ptr<splatting::Gpu> gpu = make_gpu(faults);
