@@ -471,6 +471,17 @@ class SessionTest(CommandLineTest):
         self.assertGreaterEqual(size[1], size[0])
         self.assertTrue((second / "session.photoslam").is_file())
 
+    def test_another_sensor_does_not_continue_a_session(self):
+        first = self.run_session()
+        before = {path.name: sha256(path) for path in first.iterdir() if path.is_file()}
+        for words, other in {
+            "this sensor measures none": ("--sensor", "mono"),
+            "depth.virtual_baseline_m": ("--set", "depth.virtual_baseline_m=0.123"),
+        }.items():
+            with self.subTest(words=words):
+                self.assert_fails(photoslam("run", SEQUENCE, "--load-map", first, "--output", first, *other), 1, words)
+                self.assertEqual({path.name: sha256(path) for path in first.iterdir() if path.is_file()}, before)
+
     def test_two_sessions_are_merged(self):
         first = self.run_session()
         second = self.run_deterministic("second", "--set", "pipeline.iterations_per_frame=1", "--seed", "2")

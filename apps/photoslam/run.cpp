@@ -65,11 +65,11 @@ Status configure(const RunArguments& arguments, SystemOptions& options, RunSetti
   return {};
 }
 
-Status load_session(const fs::path& path, const SourceInfo& info, RunSettings& settings) {
+Status load_session(const fs::path& path, const SystemOptions& options, const SourceInfo& info, RunSettings& settings) {
   if (path.empty()) return {};
   auto session = read_session(path);
   if (!session) return session.error();
-  if (Status fits = check_session_camera(session_header(*session), FrameRectifier(info).camera()); !fits) {
+  if (Status fits = check_session(*session, options, info); !fits) {
     return error("{}: {}", path.string(), fits.error().message);
   }
   settings.loaded_session = std::make_shared<const std::string>(std::move(*session));
@@ -148,7 +148,7 @@ Status run(const RunArguments& arguments) {
   auto source = open_source(arguments.dataset, arguments.source);
   if (!source) return source.error();
   const SourceInfo info = (*source)->info();
-  if (Status status = load_session(arguments.load_map, info, settings); !status) return status;
+  if (Status status = load_session(arguments.load_map, options, info, settings); !status) return status;
   if (Status status = prepare_output_folder(arguments.output); !status) return status;
   announce(info, arguments);
   auto gpu = arguments.backend.open();

@@ -36,7 +36,7 @@ struct RunSettings {
   bool preview = false;       ///< Progress carries pictures of what is being mapped, about once a second.
   bool logical_time = false;  ///< Tracking waits for the mapper; set by deterministic, or to spend a fixed number of
                               ///< iterations per frame.
-  std::shared_ptr<const std::string> loaded_session;  ///< Bytes of a session to continue; none: a new map.
+  std::shared_ptr<const std::string> loaded_session;  ///< Bytes that check_session() accepts; none: a new map.
   bool localize_only = false;                         ///< Track in the loaded map and leave it as it is.
   std::filesystem::path session_file;                 ///< Where the session goes at the end; empty: nowhere …
   double autosave_s = 0;                              ///< … and in between, this often; 0: never.

@@ -99,18 +99,28 @@ SessionHeader session_header(const std::string& session) {
   return header;
 }
 
-Status check_session_camera(const SessionHeader& session, const PinholeCamera& camera) {
+Status check_session_sensor(const SessionHeader& session, const PinholeCamera& camera, double bf) {
   const PinholeCamera& c = session.sensor.camera;
   const auto differs = [](double a, double b) { return std::abs(a - b) > 1e-6 * (1 + std::abs(a)); };
-  if (c.width == camera.width && c.height == camera.height && !differs(c.fx, camera.fx) && !differs(c.fy, camera.fy) &&
-      !differs(c.cx, camera.cx) && !differs(c.cy, camera.cy)) {
-    return {};
+  if (c.width != camera.width || c.height != camera.height || differs(c.fx, camera.fx) || differs(c.fy, camera.fy) ||
+      differs(c.cx, camera.cx) || differs(c.cy, camera.cy)) {
+    return error(
+        "the session was made with a camera of {}x{}, f = {:.2f}, {:.2f}, centre {:.2f}, {:.2f}; this one has {}x{}, "
+        "f = {:.2f}, {:.2f}, centre {:.2f}, {:.2f}: use frames of the same camera",
+        c.width, c.height, c.fx, c.fy, c.cx, c.cy, camera.width, camera.height, camera.fx, camera.fy, camera.cx,
+        camera.cy);
   }
-  return error(
-      "the session was made with a camera of {}x{}, f = {:.2f}, {:.2f}, centre {:.2f}, {:.2f}; this one has {}x{}, "
-      "f = {:.2f}, {:.2f}, centre {:.2f}, {:.2f}: use frames of the same camera",
-      c.width, c.height, c.fx, c.fy, c.cx, c.cy, camera.width, camera.height, camera.fx, camera.fy, camera.cx,
-      camera.cy);
+  if ((session.bf > 0) != (bf > 0)) {
+    return error("the session was made {} depth, this sensor measures {}: use frames of the same kind of sensor",
+                 session.bf > 0 ? "with" : "without", session.bf > 0 ? "none" : "it");
+  }
+  if (differs(session.bf, bf)) {
+    return error(
+        "the session measured depth with a baseline of {:.4f} m, this sensor with {:.4f} m: use the same sensor, and "
+        "depth.virtual_baseline_m as it was then",
+        session.bf / c.fx, bf / c.fx);
+  }
+  return {};
 }
 
 }  // namespace photoslam

@@ -29,7 +29,8 @@ Result<std::string> read_session(const std::filesystem::path& path);
 /// What the bytes begin with.
 SessionHeader session_header(const std::string& session);
 
-/// Whether frames of a camera fit to a session: the error says what differs.
-Status check_session_camera(const SessionHeader& session, const PinholeCamera& camera);
+/// Whether frames fit to a session, by their camera and by what a depth is worth (bf as in the header): the error says
+/// what differs.
+Status check_session_sensor(const SessionHeader& session, const PinholeCamera& camera, double bf);
 
 }  // namespace photoslam

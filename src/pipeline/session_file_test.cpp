@@ -7,6 +7,7 @@
 
 #include <cstring>
 
+#include "base/check.h"
 #include "base/file.h"
 #include "pipeline/system.h"
 #include "pipeline/testing/corner_source.h"
@@ -139,13 +140,30 @@ TEST_F(SessionTest, AutosavesAreWholeSessions) {
 
 TEST_F(SessionTest, AnotherCameraIsRefused) {
   const SessionHeader header = session_header(*bytes);
-  EXPECT_TRUE(check_session_camera(header, header.sensor.camera));
+  EXPECT_TRUE(check_session_sensor(header, header.sensor.camera, header.bf));
   EXPECT_NE(header.configuration.find("[localization"), std::string::npos);
   PinholeCamera other = header.sensor.camera;
   other.fx *= 1.01;
-  const Status status = check_session_camera(header, other);
+  const Status status = check_session_sensor(header, other, header.bf);
   ASSERT_FALSE(status);
   EXPECT_NE(status.error().message.find("same camera"), std::string::npos);
+}
+
+TEST_F(SessionTest, AnotherMeasureOfDepthIsRefused) {
+  CornerSource same(3), mono(3, 240, 180, SensorKind::mono);
+  EXPECT_TRUE(check_session(*bytes, {}, same.info()));
+  const auto message = [](const SystemOptions& options, const SourceInfo& info) {
+    const Status status = check_session(*bytes, options, info);
+    return status ? std::string() : status.error().message;
+  };
+  EXPECT_NE(message({}, mono.info()).find("this sensor measures none"), std::string::npos);
+  SystemOptions other_unit;
+  other_unit.depth.virtual_baseline_m *= 2;
+  EXPECT_NE(message(other_unit, same.info()).find("virtual_baseline_m"), std::string::npos);
+  // Nothing runs, so that nothing is overwritten.
+  RunSettings wrong = continuing("never-written");
+  EXPECT_THROW(run_slam({}, wrong, mono), CheckError);
+  EXPECT_FALSE(std::filesystem::exists(folder / "never-written"));
 }
 
 }  // namespace

@@ -35,8 +35,9 @@ int count_parts(const MapSnapshot& map) {
 Result<MergedSessions> merge_sessions(const SystemOptions& options, const std::string& first, const std::string& second,
                                       Executor& executor) {
   LoadedSession one(options, first), two(options, second);
-  if (Status fits = check_session_camera(one.header, two.header.sensor.camera); !fits) return fits.error();
-  if ((one.header.bf > 0) != (two.header.bf > 0)) return error("depth was measured in only one of the sessions");
+  if (Status fits = check_session_sensor(one.header, two.header.sensor.camera, two.header.bf); !fits) {
+    return fits.error();
+  }
 
   LoopCloser closer(options.loop_closure, options.features, one.header.sensor.camera, one.header.bf);
   auto map = one.geometry.snapshot();

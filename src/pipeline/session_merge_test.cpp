@@ -80,7 +80,7 @@ TEST_F(SessionMergeTest, SessionsOfOtherSensorsAreRefused) {
   focal = CornerSource::kWide;
   const auto merged = merge_sessions({}, session(0, 20), session(0, 40, SensorKind::mono), executor);
   ASSERT_FALSE(merged);
-  EXPECT_NE(merged.error().message.find("depth was measured in only one"), std::string::npos);
+  EXPECT_NE(merged.error().message.find("made with depth, this sensor measures none"), std::string::npos);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <thread>
 
+#include "base/check.h"
 #include "base/clock.h"
 #include "map/connected_components.h"
 #include "pipeline/config.h"
@@ -57,7 +58,8 @@ class Session {
         geometry_(options.geometry_mapping, options.features, localization_.camera(), localization_.bf()),
         loop_closer_(options.loop_closure, options.features, localization_.camera(), localization_.bf()),
         mapping_(options, settings, localization_.sensor(), executor_),
-        resumed_(settings_.loaded_session && load_session()),
+        newest_map_(settings_.loaded_session ? load_session() : nullptr),
+        visible_map_(newest_map_),
         mapping_stage_(kStageQueue, threaded_, mapping_work(), failures_),
         geometry_stage_(kStageQueue, threaded_, geometry_work(), failures_),
         loop_stage_(kStageQueue, threaded_, loop_work(), failures_),
@@ -77,7 +79,7 @@ class Session {
   void take_correction();
   void look_for_loops();
   void close_remaining_loops();
-  bool load_session();
+  std::shared_ptr<const MapSnapshot> load_session();
   std::shared_ptr<Archive> begin_session();
   void save_session();
   void deliver(MapUpdate update);
@@ -122,30 +124,27 @@ class Session {
 
   RunOutcome outcome_;
 
-  bool resumed_;  // from a session, before any stage or the feed begins to work
   Stage<MappingMessage> mapping_stage_;
   Stage<GeometryMessage> geometry_stage_;
   Stage<LoopMessage> loop_stage_;
   FrameFeed feed_;
 };
 
-bool Session::load_session() {
+/// Every component goes on where it was, before any stage or the feed begins to work.
+std::shared_ptr<const MapSnapshot> Session::load_session() {
   Archive reader(*settings_.loaded_session);
   SessionHeader header;
   reader(header);
-  if ((header.bf > 0) != (localization_.bf() > 0)) {
-    failures_.report("session", "made with another kind of sensor: depth was measured in only one of both");
-    return false;
-  }
+  const Status fits = check_session_sensor(header, localization_.camera(), localization_.bf());
+  PHOTOSLAM_CHECK(fits.ok(), "{}", fits.error().message);
   reader(geometry_, mapping_.mapper());
-  newest_map_ = geometry_.snapshot();
-  visible_map_ = newest_map_;
-  loop_closer_.resume(*newest_map_);
+  auto map = geometry_.snapshot();
+  loop_closer_.resume(*map);
   const auto num_maps =
-      std::ranges::count_if(newest_map_->keyframes, [](const auto& view) { return !view->keyframe.parent.valid(); });
-  localization_.resume(static_cast<int>(newest_map_->keyframes.size()), static_cast<int>(num_maps));
+      std::ranges::count_if(map->keyframes, [](const auto& view) { return !view->keyframe.parent.valid(); });
+  localization_.resume(static_cast<int>(map->keyframes.size()), static_cast<int>(num_maps));
   mapping_.gaussians = mapping_.mapper().gaussians().size();
-  return true;
+  return map;
 }
 
 /// Header and geometric map; the photorealistic map follows.
@@ -433,6 +432,11 @@ RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress)
 }
 
 }  // namespace
+
+Status check_session(const std::string& session, const SystemOptions& options, const SourceInfo& info) {
+  const LocalizationWorker localization(options, {}, info);
+  return check_session_sensor(session_header(session), localization.camera(), localization.bf());
+}
 
 RunOutcome run_slam(const SystemOptions& options, const RunSettings& settings, FrameSource& source,
                     std::stop_token stop, const std::function<void(const Progress&)>& on_progress) {

@@ -30,6 +30,9 @@ struct Progress {
   std::vector<Vec3> positions;                           ///< Of the camera so far, as published [m].
 };
 
+/// Whether frames of a source can continue a session (its bytes): the error says what differs.
+Status check_session(const std::string& session, const SystemOptions& options, const SourceInfo& info);
+
 /// Photo-SLAM: localization, geometry mapping and photorealistic mapping in parallel on one hyper primitives map
 /// (paper, Sec. 3). Consumes the source to its end or until `stop`, trains on every keyframe, refines, and returns
 /// trajectory and map. `on_progress` is called on this thread a few times a second.
