@@ -69,12 +69,16 @@ GeometryUpdate GeometryMapper::process(const KeyframeProposal& proposal, const s
 
 std::shared_ptr<const MapSnapshot> GeometryMapper::correct(const MapCorrection& correction) {
   map_.apply(correction);
+  // Landmarks may have been fused since the correction was computed, or by the duplicate before.
   for (const auto& [landmark, keyframe] : correction.wrong_observations) {
-    map_.remove_observation(landmark, keyframe);
-    map_.update_view(landmark);
+    const LandmarkId id = map_.living(landmark);
+    if (!id.valid()) continue;
+    map_.remove_observation(id, keyframe);
+    map_.update_view(id);
   }
   for (const auto& [from, to] : correction.duplicates) {
-    if (map_.landmark(from).view.alive && map_.landmark(to).view.alive) map_.fuse(from, to);
+    const LandmarkId duplicate = map_.living(from), kept = map_.living(to);
+    if (duplicate.valid() && kept.valid()) map_.fuse(duplicate, kept);
   }
   for (const KeyframeId keyframe : correction.loop_keyframes) fuse_into(keyframe, correction.loop_landmarks);
   return map_.snapshot();

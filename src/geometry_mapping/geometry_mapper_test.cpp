@@ -211,5 +211,25 @@ TEST_F(WalkTest, TheSameInputGivesTheSameMap) {
   }
 }
 
+TEST(GeometryMapper, CorrectsLandmarksThatWereFusedInBetween) {
+  PointWorld world;
+  Map built(PointWorld::kScaleFactor, PointWorld::kNumLevels);
+  std::vector<LandmarkId> ids;
+  for (int k = 0; k < 4; ++k) {
+    const SE3 pose = PointWorld::camera_from_world(0.2 * k);
+    built.add_keyframe(KeyframeId(k), world.observe(pose, k), pose);
+    ids.push_back(built.add_landmark(Vec3(0, 0, 3), KeyframeId(k), 0));
+  }
+  GeometryMapper geometry({}, {}, world.camera, world.bf);
+  geometry.set_map(std::move(built));
+  const Map& map = geometry.map();
+  geometry.correct({.duplicates = {{ids[0], ids[1]}}});
+  geometry.correct({.duplicates = {{ids[0], ids[2]}, {ids[1], ids[3]}}});
+  for (const LandmarkId id : ids) EXPECT_EQ(map.living(id), ids[3]);
+  ASSERT_EQ(map.landmark(ids[3]).observations.size(), 4u);
+  geometry.correct({.wrong_observations = {{ids[0], KeyframeId(1)}}});
+  EXPECT_EQ(map.landmark(ids[3]).observations.size(), 3u);
+}
+
 }  // namespace
 }  // namespace photoslam

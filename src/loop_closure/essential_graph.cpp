@@ -28,14 +28,15 @@ PoseGraph essential_graph(const MapSnapshot& map, int min_shared) {
     int shared_with_parent = kLeastShared;
     for (const auto& [other, shared] : view->covisible) {
       if (other == keyframe.parent) shared_with_parent = shared;
-      if (shared >= min_shared && other < keyframe.id && other != keyframe.parent) connect(other, keyframe.id, shared);
+      const bool in_tree = other == keyframe.parent || map.keyframe(other).keyframe.parent == keyframe.id;
+      if (shared >= min_shared && other < keyframe.id && !in_tree) connect(other, keyframe.id, shared);
     }
     if (keyframe.parent.valid()) connect(keyframe.parent, keyframe.id, shared_with_parent);
   }
   return graph;
 }
 
-/// Moves the younger of two maps so that the loop is met. Returns its root and the keyframe that it now hangs on.
+/// Moves the younger of two maps so that the loop is met. Returns by which keyframe it now hangs on which.
 std::pair<KeyframeId, KeyframeId> join_maps(const MapSnapshot& map, const Loop& loop, PoseGraph& graph) {
   const KeyframeId then_root = map.root_of(loop.then), now_root = map.root_of(loop.now);
   const bool now_moves = then_root < now_root;
@@ -48,7 +49,7 @@ std::pair<KeyframeId, KeyframeId> join_maps(const MapSnapshot& map, const Loop& 
     if (map.root_of(id) == moving_root) pose(id) = pose(id) * old_from_new_world;
   }
   graph.pose_is_fixed[static_cast<size_t>(moving_root.value)] = 0;
-  return {moving_root, now_moves ? loop.then : loop.now};
+  return now_moves ? std::pair(loop.now, loop.then) : std::pair(loop.then, loop.now);
 }
 
 double typical_depth(const MapSnapshot& map) {
@@ -67,7 +68,7 @@ MapCorrection close_loop(const PoseGraphOptions& options, int min_shared, bool w
   const std::vector<Sim3> before = graph.pose_from_world;
   MapCorrection correction = recognize_landmarks(map, loop);
   if (map.root_of(loop.then) != map.root_of(loop.now)) {
-    correction.new_parents.push_back(join_maps(map, loop, graph));
+    correction.joints.push_back(join_maps(map, loop, graph));
   }
   // One exact observation against long chains of others: the loop is to be met, not to be averaged away.
   constexpr double kLoopWeight = 100;

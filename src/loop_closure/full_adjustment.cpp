@@ -3,6 +3,7 @@
 #include "loop_closure/full_adjustment.h"
 
 #include <algorithm>
+#include <set>
 #include <vector>
 
 #include "math/median.h"
@@ -22,14 +23,15 @@ struct Problem {
 Problem::Problem(const MapSnapshot& map, bool scale_is_known) {
   constexpr int kNone = -1;
   std::vector<int> point_of_landmark(static_cast<size_t>(map.num_landmarks), kNone);
+  std::set<KeyframeId> roots_of_known_scale;
   for (const auto& view : map.keyframes) {
     const Keyframe& keyframe = view->keyframe;
     bundle.camera_from_world.push_back(keyframe.camera_from_world);
     const bool is_root = !keyframe.parent.valid();
-    const bool holds_scale =
-        !is_root && !keyframe.culled && !scale_is_known && !map.keyframe(keyframe.parent).keyframe.parent.valid();
+    const bool is_child_of_root =
+        !is_root && !keyframe.culled && !map.keyframe(keyframe.parent).keyframe.parent.valid();
+    const bool holds_scale = !scale_is_known && is_child_of_root && roots_of_known_scale.insert(keyframe.parent).second;
     bundle.pose_is_fixed.push_back(is_root || holds_scale || keyframe.culled ? 1 : 0);
-    if (holds_scale) scale_is_known = true;
     for (size_t i = 0; i < keyframe.landmarks.size(); ++i) {
       LandmarkId id = keyframe.landmarks[i];
       const LandmarkView* landmark = map.find(id);

@@ -50,8 +50,8 @@ void LoopCloser::resume(const MapSnapshot& map) {
   num_issued_ = map.num_corrections;
 }
 
-/// The covisible keyframes of one that stays around are the last few; a gap in them means that the camera left and came
-/// back.
+/// The covisible keyframes of one that stays around are the last few; others in between, unless they were culled, mean
+/// that the camera left and came back.
 void LoopCloser::count_reconnection(const MapSnapshot& map, KeyframeId id) {
   std::vector<KeyframeId> neighbours{id};
   for (const auto& neighbour : map.keyframe(id).covisible) {
@@ -60,7 +60,11 @@ void LoopCloser::count_reconnection(const MapSnapshot& map, KeyframeId id) {
   std::ranges::sort(neighbours);
   bool old_place = false;
   for (size_t i = 1; i < neighbours.size(); ++i) {
-    old_place |= neighbours[i].value - neighbours[i - 1].value >= options_.detection.min_keyframe_gap;
+    int elsewhere = 0;
+    for (KeyframeId k(neighbours[i - 1].value + 1); k < neighbours[i]; ++k.value) {
+      elsewhere += !map.keyframe(k).keyframe.culled;
+    }
+    old_place |= elsewhere + 1 >= options_.detection.min_keyframe_gap;
   }
   // A loop that was just closed shows as well; it has been counted.
   const bool just_closed = !loops_.empty() && id.value - loops_.back().now.value < options_.detection.min_keyframe_gap;

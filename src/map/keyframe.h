@@ -38,7 +38,7 @@ struct Keyframe {
   std::shared_ptr<const FeatureFrame> frame;
   SE3 camera_from_world;
   std::vector<LandmarkId> landmarks;  ///< [N] landmark seen by each keypoint; invalid where there is none.
-  KeyframeId parent;                  ///< Spanning tree: the keyframe it shared most landmarks with at birth.
+  KeyframeId parent;    ///< Spanning tree: a keyframe that it shared landmarks with; none for the root of a map.
   double scale = 1.0;   ///< Present unit of the camera frame in units of the one at birth: what was measured then grows
                         ///< by this factor. Only loops of a monocular camera change it.
   bool culled = false;  ///< It lost its features and landmarks, and follows its parent.

@@ -240,7 +240,22 @@ void Map::apply(const MapCorrection& correction) {
     set_position(id, position);
     update_view(id);
   }
-  for (const auto& [child, parent] : correction.new_parents) set_parent(child, living(parent));
+  for (const auto& [child, parent] : correction.joints) join(child, parent);
+}
+
+void Map::join(KeyframeId child, KeyframeId parent) {
+  const auto root_of = [this](KeyframeId id) {
+    while (keyframe(id).parent.valid()) id = keyframe(id).parent;
+    return id;
+  };
+  PHOTOSLAM_CHECK(root_of(child) != root_of(parent), "keyframes {} and {} are in one tree", child.value, parent.value);
+  parent = living(parent);
+  for (child = living(child); child.valid();) {
+    const KeyframeId next = keyframe(child).parent;
+    set_parent(child, parent);
+    parent = child;
+    child = next;
+  }
 }
 
 void Map::append(const Map& other) {

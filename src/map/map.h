@@ -55,6 +55,9 @@ class Map {
   /// Counts sightings by tracked frames.
   void count_sightings(LandmarkId id, int visible, int found);
   void set_parent(KeyframeId keyframe, KeyframeId parent) { mutable_keyframe(keyframe).parent = parent; }
+  /// Makes one spanning tree of two: that of `child` is turned to hang by it on `parent`, so that parents stay
+  /// keyframes that see the same.
+  void join(KeyframeId child, KeyframeId parent);
   /// Takes the keyframe out of geometry: it observes nothing any more, and follows its parent as an anchor of what was
   /// measured in its frame. Its children become its parent's. Not for the root of a spanning tree.
   void cull_keyframe(KeyframeId keyframe);

@@ -19,8 +19,8 @@ struct MapCorrection {
   /// Moves in addition to that of the oldest observer [m, new world].
   std::map<LandmarkId, Vec3> landmark_shifts = {};
 
-  /// Spanning tree: the first, until now the root of a map of its own, becomes a child of the second.
-  std::vector<std::pair<KeyframeId, KeyframeId>> new_parents = {};
+  /// Maps of their own until now: that of the first keyframe hangs by it on the second.
+  std::vector<std::pair<KeyframeId, KeyframeId>> joints = {};
   /// Landmarks that are the same point: the first is to become the second.
   std::vector<std::pair<LandmarkId, LandmarkId>> duplicates = {};
   /// Landmarks that these keyframes do not see after all.

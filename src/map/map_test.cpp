@@ -195,6 +195,18 @@ TEST_F(MapTest, ACorrectionMovesCulledKeyframesWithTheirParentAtItsScale) {
   EXPECT_LT((relative() * corrected.inverse()).log().norm(), 1e-12);
 }
 
+TEST_F(MapTest, AMapThatJoinsAnotherHangsWhereTheyMeet) {
+  // 0; 1 ← 2 ← 3, where 2 is culled when the correction arrives.
+  for (int k = 2; k < 4; ++k) map.set_parent(KeyframeId(k), KeyframeId(k - 1));
+  map.cull_keyframe(KeyframeId(2));
+  map.join(KeyframeId(3), KeyframeId(0));
+  const auto parent = [&](int k) { return map.keyframe(KeyframeId(k)).parent; };
+  EXPECT_FALSE(parent(0).valid());
+  EXPECT_EQ(parent(3), KeyframeId(0));
+  EXPECT_EQ(parent(1), KeyframeId(3));
+  EXPECT_EQ(parent(2), KeyframeId(1)) << "still follows what it was culled for";
+}
+
 class CorrectedMap : public ::testing::Test {
  protected:
   CorrectedMap() {
