@@ -38,7 +38,8 @@ struct Closing {
     while (const auto correction = closer.process(*map)) map = geometry.correct(*correction);
   }
 
-  /// Distance between where the last keyframe is and where it should be, seen from the first.
+  /// Distance between where the last keyframe is and where it should be, seen from the first. Without depth the size of
+  /// the world is free.
   double gap() const {
     const Map& map = geometry.map();
     const size_t last = corridor.truth.size() - 1;
@@ -46,17 +47,27 @@ struct Closing {
     const SE3 estimate = relative(map.keyframe(KeyframeId(0)).camera_from_world,
                                   map.keyframe(KeyframeId(static_cast<int32_t>(last))).camera_from_world);
     const SE3 exact = relative(corridor.truth[0], corridor.truth[last]);
-    return (estimate.inverse().translation - exact.inverse().translation).norm();
+    return (alignment().scale * estimate.inverse().translation - exact.inverse().translation).norm();
   }
 
-  double ate() const {
+  std::pair<std::vector<Vec3>, std::vector<Vec3>> centres() const {
     std::vector<Vec3> estimate, exact;
     for (size_t k = 0; k < corridor.truth.size(); ++k) {
       estimate.push_back(
           geometry.map().keyframe(KeyframeId(static_cast<int32_t>(k))).camera_from_world.inverse().translation);
       exact.push_back(corridor.truth[k].inverse().translation);
     }
-    const Sim3 fit = align_umeyama(estimate, exact, bf <= 0);
+    return {estimate, exact};
+  }
+
+  Sim3 alignment() const {
+    const auto [estimate, exact] = centres();
+    return align_umeyama(estimate, exact, bf <= 0);
+  }
+
+  double ate() const {
+    const auto [estimate, exact] = centres();
+    const Sim3 fit = alignment();
     double sum = 0;
     for (size_t k = 0; k < exact.size(); ++k) sum += (fit * estimate[k] - exact[k]).squaredNorm();
     return std::sqrt(sum / static_cast<double>(exact.size()));
@@ -96,6 +107,22 @@ TEST_P(LoopCloserSeeds, RepeatedDoorsAreNoLoop) {
   }
 }
 
+TEST_P(LoopCloserSeeds, ClosesWhereKeyframesHaveFewLandmarks) {
+  for (const bool with_depth : {true, false}) {
+    Closing closing(CorridorWorld::square(10, GetParam(), 12), with_depth, 0, GetParam());
+    for (size_t k = 0; k < closing.corridor.truth.size(); ++k) {
+      ASSERT_LT(closing.geometry.map().keyframe(KeyframeId(static_cast<int32_t>(k))).landmarks.size(), 100);
+    }
+    expect_closed(closing);
+  }
+}
+
+TEST_P(LoopCloserSeeds, ClosesWhereLandmarksAreMadeMoreThanOnce) {
+  Closing closing(CorridorWorld::square(10, GetParam()), true, 0, GetParam());
+  closing.geometry.set_map(closing.corridor.drifted_map(0.004, 0.002, 0, true, GetParam(), 0.3));
+  expect_closed(closing);
+}
+
 TEST(LoopCloser, RecognizesTheLandmarksOfAPlaceThatIsMet) {
   CorridorWorld corridor = CorridorWorld::square(10, 3);
   Closing closing(corridor, true, 0, 3);
@@ -110,6 +137,25 @@ TEST(LoopCloser, RecognizesTheLandmarksOfAPlaceThatIsMet) {
   EXPECT_TRUE(sees_the_start());
   EXPECT_EQ(closing.closer.num_closed(), 0);
   EXPECT_LT(closing.gap(), 0.02);
+}
+
+TEST(LoopCloser, CulledKeyframesAreNoWayAround) {
+  CorridorWorld corridor = CorridorWorld::repeated_doors(20, 100, 3);
+  for (const bool with_gap : {false, true}) {
+    Map map = corridor.drifted_map(0, 0, 0, true, 3);
+    for (int k = 35; k < 40; ++k) {
+      if (!with_gap) map.cull_keyframe(KeyframeId(k));
+      for (const LandmarkId id : std::vector<LandmarkId>(map.keyframe(KeyframeId(k)).landmarks)) {
+        if (id.valid()) map.remove_observation(id, KeyframeId(k));
+      }
+    }
+    LoopClosureOptions options;
+    options.detection.min_keyframe_gap = 5;
+    options.detection.min_matches = 1000;  // this is about what tracking has found
+    LoopCloser closer(options, orb(), corridor.world.camera, corridor.world.bf);
+    closer.process(*map.snapshot());
+    EXPECT_EQ(closer.num_reconnected(), with_gap ? 1 : 0);
+  }
 }
 
 TEST(FullAdjustment, LandmarksTakenForOneAnotherLeaveTheMap) {
@@ -192,11 +238,32 @@ TEST(LoopCloser, JoinsTwoMapsThatMeet) {
     const double before = closing.gap();
     closing.run();
     EXPECT_GE(closing.closer.num_closed(), 1);
-    EXPECT_GT(before, 900);
+    EXPECT_GT(before, with_depth ? 900 : 5);
     EXPECT_LT(closing.gap(), 0.3);
-    EXPECT_TRUE(closing.geometry.map().keyframe(KeyframeId(100)).parent.valid());
     EXPECT_FALSE(closing.geometry.map().keyframe(KeyframeId(0)).parent.valid());
+    for (size_t k = 1; k < corridor.truth.size(); ++k) {
+      const KeyframeId parent = closing.geometry.map().keyframe(KeyframeId(static_cast<int32_t>(k))).parent;
+      ASSERT_TRUE(parent.valid()) << k;
+      const SE3 from_parent = corridor.truth[k] * corridor.truth[static_cast<size_t>(parent.value)].inverse();
+      EXPECT_LT(from_parent.translation.norm(), 5) << k << " sees what its parent sees";
+    }
   }
+}
+
+TEST(FullAdjustment, KeepsTheSizeOfEveryMapOfASingleCamera) {
+  CorridorWorld corridor = CorridorWorld::square(10, 3);
+  GeometryMapper geometry({}, orb(), corridor.world.camera, 0);
+  geometry.set_map(cut(corridor.drifted_map(0.002, 0.0005, 0, false, 3), KeyframeId(100),
+                       Sim3(1.6, so3_exp(Vec3(0.5, 2, -1)), Vec3(-100, 20, 3))));
+  const auto centre = [](const MapSnapshot& map, int k) {
+    return map.keyframe(KeyframeId(k)).keyframe.camera_from_world.inverse().translation;
+  };
+  const auto before = geometry.snapshot();
+  const auto after = geometry.correct(adjust_everything({.max_iterations = 10}, corridor.world.camera, 0, *before));
+  for (const int held : {0, 1, 100, 101}) {
+    EXPECT_LT((centre(*after, held) - centre(*before, held)).norm(), 1e-9) << held;
+  }
+  EXPECT_GT((centre(*after, 110) - centre(*before, 110)).norm(), 1e-4) << "the others have moved";
 }
 
 }  // namespace

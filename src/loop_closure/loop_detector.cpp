@@ -27,21 +27,27 @@ std::vector<Descriptor> strongest_descriptors(const Features& features) {
   return descriptors;
 }
 
-/// Tells whether what was found of the expected landmarks is spread over the image as they are.
-class CellCoverage {
+/// What was expected and found in the cells of an image.
+class CellCounts {
  public:
-  explicit CellCoverage(const PinholeCamera& camera) : camera_(camera) {}
-
-  void count(const ProjectionQuery& query, bool found) {
-    const auto cell = [](float x, int size, int cells) {
-      return std::clamp(static_cast<int>(x * static_cast<float>(cells) / static_cast<float>(size)), 0, cells - 1);
-    };
-    const int index = cell(query.y, camera_.height, kRows) * kColumns + cell(query.x, camera_.width, kColumns);
-    ++expected_[static_cast<size_t>(index)];
-    found_[static_cast<size_t>(index)] += found;
+  CellCounts(const PinholeCamera& camera, const Features& features) : camera_(camera) {
+    for (const Keypoint& k : features.keypoints) ++keypoints_[cell(k.x, k.y)];
   }
 
-  double share() const {
+  void count(const ProjectionQuery& query, bool found) {
+    ++expected_[cell(query.x, query.y)];
+    found_[cell(query.x, query.y)] += found;
+  }
+
+  /// Noisy measurements make a landmark anew in every keyframe, and keypoints are shared out among them.
+  int findable() const {
+    int sum = 0;
+    for (size_t i = 0; i < expected_.size(); ++i) sum += std::min(expected_[i], keypoints_[i]);
+    return sum;
+  }
+
+  /// Whether what was found is spread over the image as what was expected is.
+  double coverage() const {
     int cells = 0, covered = 0;
     for (size_t i = 0; i < expected_.size(); ++i) {
       if (expected_[i] < kMinExpected) continue;
@@ -54,8 +60,17 @@ class CellCoverage {
  private:
   static constexpr int kColumns = 8, kRows = 6, kMinExpected = 3;
   static constexpr double kMinFoundShare = 0.2;
+
+  size_t cell(float x, float y) const {
+    const auto along = [](float position, int size, int cells) {
+      return std::clamp(static_cast<int>(position * static_cast<float>(cells) / static_cast<float>(size)), 0,
+                        cells - 1);
+    };
+    return static_cast<size_t>(along(y, camera_.height, kRows) * kColumns + along(x, camera_.width, kColumns));
+  }
+
   const PinholeCamera& camera_;
-  std::array<int, kColumns * kRows> expected_{}, found_{};
+  std::array<int, kColumns * kRows> expected_{}, found_{}, keypoints_{};
 };
 
 /// Those that share landmarks with a keyframe, at least a quarter as many as the one that shares most: drift lets a few
@@ -85,11 +100,14 @@ void LoopDetectorOptions::visit(OptionVisitor& v) {
   v.value({"max_candidates", "", 1, 100, "Similar keyframes that are verified for each new one."}, max_candidates);
   v.value({"min_keyframe_gap", "", 1, 10000, "A loop spans at least so many keyframes of one map."}, min_keyframe_gap);
   v.value({"min_matches", "", 6, 1000, "Descriptor matches a candidate needs."}, min_matches);
-  v.value({"min_guided_matches", "", 6, 10000, "Landmarks of the old place that must be found again."},
+  v.value({"min_guided_matches", "", 6, 10000, "Landmarks of the old place that must be found again and agree, …"},
           min_guided_matches);
+  v.value(
+      {"min_guided_share", "", 0.0, 1.0, "… or this share of the keypoints whose depth the keyframe knows, if fewer."},
+      min_guided_share);
   v.value({"min_matched_share", "", 0.0, 1.0,
-           "Share of the landmarks that should be visible and are found again; lower finds loops under changed light, "
-           "higher resists places that repeat."},
+           "Share of the landmarks that should be visible and is found again, and two standard deviations more: fewer "
+           "landmarks tell less. Lower finds loops under changed light, higher resists places that repeat."},
           min_matched_share);
   v.value({"min_coverage", "", 0.0, 1.0,
            "Share of the image, of what should show the old place, in which some of it is found again: a thing that "
@@ -203,20 +221,33 @@ LoopDetector::Search LoopDetector::search(const MapSnapshot& map, std::span<cons
   matcher_.match(match_options, {keyframe.frame->features, keyframe.frame->grid, {}, {}}, projector_.queries(),
                  keypoint_of_query);
   Search result;
-  result.expected = static_cast<int>(projector_.size());
-  CellCoverage cells(camera_);
+  CellCounts cells(camera_, keyframe.frame->features);
   for (size_t query = 0; query < keypoint_of_query.size(); ++query) {
     const bool found = keypoint_of_query[query] != kNoMatch;
     cells.count(projector_.queries()[query], found);
     if (found) result.matches.emplace_back(projector_.point(query).landmark, keypoint_of_query[query]);
   }
-  result.coverage = cells.share();
+  result.findable = cells.findable();
+  result.coverage = cells.coverage();
   return result;
 }
 
+/// Whether more was found than of a place that only looks alike: of that it would be `min_matched_share`, give or take
+/// the deviation of a binomial distribution, and not everywhere.
 bool LoopDetector::is_same_place(const Search& search) const {
-  return static_cast<double>(search.matches.size()) >= options_.min_matched_share * search.expected &&
+  constexpr double kDeviations = 2;
+  const double share = options_.min_matched_share, mean = share * search.findable;
+  return static_cast<double>(search.matches.size()) > mean + kDeviations * std::sqrt((1 - share) * mean) &&
          search.coverage >= options_.min_coverage;
+}
+
+/// Whether as many matches agree as fix the transform well, or as a keyframe that knows little can be asked for.
+bool LoopDetector::is_precise(const MapSnapshot& map, const Loop& loop) const {
+  const Keyframe& now = map.keyframe(loop.now).keyframe;
+  int known = 0;
+  for (size_t i = 0; i < now.landmarks.size(); ++i) known += point_in_camera(map, now, i).has_value();
+  const double needed = std::min<double>(options_.min_guided_matches, options_.min_guided_share * known);
+  return static_cast<double>(loop.matches.size()) >= needed;
 }
 
 std::optional<Loop> LoopDetector::verify(const MapSnapshot& map, KeyframeId then_id, KeyframeId now_id) {
@@ -253,8 +284,7 @@ std::optional<Loop> LoopDetector::verify(const MapSnapshot& map, KeyframeId then
       if (found.inlier[i]) loop.matches.push_back(usable[i]);
     }
   }
-  const bool enough = static_cast<int>(loop.matches.size()) >= options_.min_guided_matches;
-  return enough && is_same_place(seen) ? std::optional(loop) : std::nullopt;
+  return is_same_place(seen) && is_precise(map, loop) ? std::optional(loop) : std::nullopt;
 }
 
 /// Whether the map has the landmarks already where the loop wants them in the image, and not by chance.
@@ -298,7 +328,7 @@ bool LoopDetector::confirm(const MapSnapshot& map, const Loop& loop) {
     const Sim3 neighbour_from_now(keyframe.camera_from_world * world_from_now);
     const SE3 pose = (neighbour_from_now * loop.now_from_then * Sim3(then_from_world)).rigid();
     const Search seen = search(map, loop.landmarks, pose, keyframe, options_.search_radius_px);
-    if (static_cast<int>(seen.matches.size()) >= options_.min_matches && is_same_place(seen)) ++confirmed;
+    confirmed += is_same_place(seen);
   }
   return confirmed >= options_.min_confirmations;
 }

@@ -20,6 +20,7 @@ struct LoopDetectorOptions {
   int min_keyframe_gap = 10;
   int min_matches = 20;
   int min_guided_matches = 40;
+  double min_guided_share = 0.3;
   double min_matched_share = 0.25;
   double min_coverage = 0.5;
   double search_radius_px = 6.0;
@@ -41,8 +42,9 @@ struct Loop {
 };
 
 /// Recognises places: an index of descriptors proposes keyframes that look alike, geometry decides. A loop is reported
-/// only when `now` finds most of the landmarks around `then` that it should see, and so do keyframes next to it: doors
-/// that repeat along a corridor look alike, but not with everything around them. Deterministic.
+/// only when `now` finds many of the landmarks around `then` that it should see, all over the image, and keyframes next
+/// to it find many too: doors that repeat along a corridor look alike, but not with everything around them.
+/// Deterministic.
 class LoopDetector {
  public:
   /// `with_scale`: depth was not measured, so the map may have shrunk or grown on the way.
@@ -60,13 +62,14 @@ class LoopDetector {
   std::vector<PointMatch> match_features(const MapSnapshot& map, const Keyframe& then, const Keyframe& now) const;
   /// What a keyframe at a given pose finds of the landmarks it should see.
   struct Search {
-    int expected = 0;
+    int findable = 0;     ///< Expected landmarks, but in no part of the image more than it has keypoints.
     double coverage = 0;  ///< Share of the image cells with expected landmarks in which some were found.
     std::vector<std::pair<LandmarkId, int>> matches;
   };
   Search search(const MapSnapshot& map, std::span<const LandmarkId> landmarks, const SE3& camera_from_world,
                 const Keyframe& keyframe, double radius_px);
   bool is_same_place(const Search& search) const;
+  bool is_precise(const MapSnapshot& map, const Loop& loop) const;
   bool is_met(const MapSnapshot& map, const Loop& loop) const;
   bool is_news(const MapSnapshot& map, const Loop& loop) const;
   bool confirm(const MapSnapshot& map, const Loop& loop);

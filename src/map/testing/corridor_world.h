@@ -22,7 +22,7 @@ struct CorridorWorld {
   std::vector<SE3> truth;  ///< [K] camera_from_world
 
   /// A square of corridors of this side length, walked once and a little further.
-  static CorridorWorld square(double side, uint64_t seed) {
+  static CorridorWorld square(double side, uint64_t seed, double points_per_metre = 70) {
     CorridorWorld result(seed);
     const auto pose_at = [side](double s) {
       s = std::fmod(s, 4 * side);
@@ -40,7 +40,8 @@ struct CorridorWorld {
     };
     for (int edge = 0; edge < 4; ++edge) {
       const SE3 frame = pose_at((edge + 0.5) * side);
-      result.add_walls(frame * SE3(Quat::Identity(), Vec3(0, 0, -0.5 * side)), -kHalfWidth, side + kHalfWidth, 70);
+      result.add_walls(frame * SE3(Quat::Identity(), Vec3(0, 0, -0.5 * side)), -kHalfWidth, side + kHalfWidth,
+                       points_per_metre);
     }
     // The turn at the start is the end of the last edge.
     for (double s = kStep; s < 4 * side + 4.0; s += kStep) result.truth.push_back(pose_at(s).inverse());
@@ -70,8 +71,10 @@ struct CorridorWorld {
   }
 
   /// The map of a walk whose steps are wrong by a random twist each, and of landmarks that are lost after a few
-  /// keyframes: a place seen again is mapped anew. `scale_drift`: relative growth per step (monocular).
-  Map drifted_map(double translation_error, double rotation_error, double scale_drift, bool with_depth, uint64_t seed) {
+  /// keyframes: a place seen again is mapped anew. `scale_drift`: relative growth per step (monocular). `renewal`: how
+  /// often a landmark is not recognised in the next keyframe, and made once more.
+  Map drifted_map(double translation_error, double rotation_error, double scale_drift, bool with_depth, uint64_t seed,
+                  double renewal = 0) {
     Map map(PointWorld::kScaleFactor, PointWorld::kNumLevels);
     Random random(seed);
     struct Track {
@@ -106,7 +109,8 @@ struct CorridorWorld {
         const int point = world.point_of_keypoint[i];
         constexpr int kLost = 8;
         const auto track = tracks.find(point);
-        if (track != tracks.end() && static_cast<int>(k) - track->second.last_seen < kLost) {
+        const bool is_followed = track != tracks.end() && static_cast<int>(k) - track->second.last_seen < kLost;
+        if (is_followed && (renewal == 0 || random.uniform() >= renewal)) {
           map.add_observation(track->second.landmark, id, static_cast<int>(i));
           track->second.last_seen = static_cast<int>(k);
           continue;
