@@ -128,20 +128,26 @@ class Compared {
   PhotorealisticMapper remote;
 };
 
+/// Seeds for small pictures, and training as large as on a GPU, which spares no pixels, wherever it happens.
+PhotorealisticOptions test_options() {
+  PhotorealisticOptions options;
+  options.seeding.cell_px = 8;
+  options.schedule.online_pixels = 1000000;
+  return options;
+}
+
 size_t num_gaussians(const PhotorealisticMapper& mapper) { return mapper.gaussians().size(); }
 
 TEST(MapperOnGpu, DoesWhatItDoesOnTheCpu) {
   Story story({96, 72, 84, 84, 50, 34});
   SerialExecutor executor;
-  PhotorealisticOptions options;
-  options.seeding.cell_px = 8;
+  PhotorealisticOptions options = test_options();
   options.reseed_interval = 7;
   options.densification.interval = 5;
   options.densification.gradient_threshold = 1e-9;  // all that is seen doubles: none is at the threshold
   options.depth_weight = 0.1;
   options.opacity_weight = 0.01;
   options.schedule.start_pixels = 48 * 36;
-  options.schedule.online_pixels = 1000000;  // a GPU spares none
   Compared mappers(options, story.sensor());
   PhotorealisticMapper& mapper = mappers.remote;
 
@@ -220,9 +226,7 @@ struct DoubledWall {
 TEST(MapperOnGpu, MergesWhatALoopHasDoubledAsOnTheCpu) {
   for (const bool enabled : {true, false}) {
     DoubledWall wall;
-    PhotorealisticOptions options;
-    options.seeding.cell_px = 8;
-    options.schedule.online_pixels = 1000000;
+    PhotorealisticOptions options = test_options();
     options.handover = false;
     options.doubling.enabled = enabled;
     options.doubling.max_distance = 3;  // seeds of a cell need not be at the same pixel
@@ -239,9 +243,7 @@ TEST(MapperOnGpu, MergesWhatALoopHasDoubledAsOnTheCpu) {
 TEST(MapperOnGpu, RelocatesUnderTheCapAsOnTheCpu) {
   for (const bool enabled : {true, false}) {
     DoubledWall wall;
-    PhotorealisticOptions options;
-    options.seeding.cell_px = 8;
-    options.schedule.online_pixels = 1000000;
+    PhotorealisticOptions options = test_options();
     options.densification.relocation = enabled;
     options.densification.max_gaussians = 80;
     Compared mappers(options, wall.story.sensor());
@@ -256,9 +258,7 @@ TEST(MapperOnGpu, WeighsOpacityAsOnTheCpu) {
   SerialExecutor executor;
   double sums[2] = {};
   for (const double weight : {0.0, 20.0}) {
-    PhotorealisticOptions options;
-    options.seeding.cell_px = 8;
-    options.schedule.online_pixels = 1000000;
+    PhotorealisticOptions options = test_options();
     options.opacity_weight = weight;
     PhotorealisticMapper remote(options, story.sensor(), 1, make_gpu()), cpu(options, story.sensor(), 1);
     if (weight == 0) story.next_keyframe(at(0));
@@ -289,14 +289,12 @@ struct ShortRun {
   explicit ShortRun(HostFaults* faults) {
     Story story({48, 36, 42, 42, 24, 18});
     SerialExecutor executor;
-    PhotorealisticOptions options;
-    options.seeding.cell_px = 8;
+    PhotorealisticOptions options = test_options();
     options.reseed_interval = 2;
     options.densification.interval = 3;
     options.densification.gradient_threshold = 5e-5;
     options.depth_weight = 0.01;
     options.schedule.start_pixels = 24 * 18;
-    options.schedule.online_pixels = 1000000;
     std::shared_ptr<splatting::Gpu> gpu = make_gpu(faults);
     PhotorealisticMapper mapper(options, story.sensor(), 1, gpu);
     for (const double x : {0.0, 0.4}) {
