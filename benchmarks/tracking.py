@@ -24,6 +24,7 @@ COLUMNS = {
     "blocked p99 ms": ("tracking", "blocked_p99_ms", 1), "latency p99 ms": ("latency", "p99_ms", 1),
     "PSNR dB": ("image_online", "psnr_db", 1),
 }
+MAPPER = "mapper cores"  # processor time of photorealistic mapping per second of input
 
 
 def run(program: str, sequence: str, sensor: str) -> dict:
@@ -38,8 +39,10 @@ def run(program: str, sequence: str, sensor: str) -> dict:
 def figures(report: dict) -> dict:
     if report["config"]["changed"]:
         sys.exit(f"not the default configuration: {report['config']['changed']}")
-    return {name: (report.get(group) or {}).get(key, float("nan")) * scale
-            for name, (group, key, scale) in COLUMNS.items()}
+    result = {name: (report.get(group) or {}).get(key, float("nan")) * scale
+              for name, (group, key, scale) in COLUMNS.items()}
+    mapping = report["mapping"]
+    return result | {MAPPER: mapping["cpu_seconds"] / (mapping["seconds_online"] + mapping["seconds_drain"])}
 
 
 def main() -> None:
@@ -49,8 +52,9 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--json", type=pathlib.Path)
     arguments = parser.parse_args()
-    print("| sequence | runs | ATE spread % | " + " | ".join(COLUMNS) + " |")
-    print("|---" * (len(COLUMNS) + 3) + "|", flush=True)
+    columns = [*COLUMNS, MAPPER]
+    print("| sequence | runs | ATE spread % | " + " | ".join(columns) + " |")
+    print("|---" * (len(columns) + 3) + "|", flush=True)
     everything = {}
     for entry in arguments.sequences:
         name, _, place = entry.partition("=")
@@ -59,7 +63,7 @@ def main() -> None:
         everything[name] = runs
         errors = [r["ATE cm"] for r in runs]
         spread = 100 * (max(errors) - min(errors)) / statistics.median(errors)
-        medians = [statistics.median(r[column] for r in runs) for column in COLUMNS]
+        medians = [statistics.median(r[column] for r in runs) for column in columns]
         print(f"| {name} | {len(runs)} | {spread:.1f} | " + " | ".join(f"{m:.4g}" for m in medians) + " |", flush=True)
     if arguments.json:
         arguments.json.write_text(json.dumps(everything, indent=1))

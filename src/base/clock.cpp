@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/clock.h"
 
+#include <pthread.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -21,6 +22,11 @@ double read_clock(clockid_t clock) {
 }  // namespace
 
 double thread_cpu_seconds() { return read_clock(CLOCK_THREAD_CPUTIME_ID); }
+double thread_cpu_seconds(std::thread& thread) {
+  clockid_t clock{};
+  return pthread_getcpuclockid(thread.native_handle(), &clock) == 0 ? read_clock(clock) : 0;
+}
+
 double process_cpu_seconds() { return read_clock(CLOCK_PROCESS_CPUTIME_ID); }
 
 double peak_rss_mb() {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <thread>
 
 namespace photoslam {
 
@@ -19,6 +20,8 @@ class Stopwatch {
 
 /// CPU time used so far by the calling thread [s].
 double thread_cpu_seconds();
+/// The same of another thread, which has not been joined yet; 0 where the system does not tell.
+double thread_cpu_seconds(std::thread& thread);
 /// CPU time used so far by the whole process [s].
 double process_cpu_seconds();
 /// Largest resident set so far [MB, 1e6 bytes].

@@ -6,6 +6,7 @@
 #include <exception>
 
 #include "base/check.h"
+#include "base/clock.h"
 
 namespace photoslam {
 
@@ -79,6 +80,12 @@ void ThreadPool::for_each(int count, const std::function<void(int, int)>& task) 
     batch_finished_.wait(lock, [&] { return batch.workers_inside == 0; });
   }
   if (batch.failure) std::rethrow_exception(batch.failure);
+}
+
+double ThreadPool::helper_cpu_seconds() {
+  double seconds = 0;
+  for (std::thread& thread : threads_) seconds += thread_cpu_seconds(thread);
+  return seconds;
 }
 
 void ThreadPool::work(int worker) {

@@ -23,6 +23,9 @@ class Executor {
   /// Calls task(i, worker) once for every i in [0, count) and returns when all have finished.
   /// The first exception thrown by a task is rethrown here; the other tasks still run.
   virtual void for_each(int count, const std::function<void(int index, int worker)>& task) = 0;
+
+  /// CPU time used so far by the workers that are not calling threads [s].
+  virtual double helper_cpu_seconds() { return 0; }
 };
 
 /// Runs every task in order on the calling thread.
@@ -43,6 +46,7 @@ class ThreadPool final : public Executor {
 
   int concurrency() const override { return static_cast<int>(threads_.size()) + 1; }
   void for_each(int count, const std::function<void(int, int)>& task) override;
+  double helper_cpu_seconds() override;
 
  private:
   struct Batch;

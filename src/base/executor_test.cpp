@@ -4,8 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <stdexcept>
+
+#include "base/clock.h"
 
 namespace photoslam {
 namespace {
@@ -28,6 +31,24 @@ TEST(ThreadPool, SurvivesManySmallBatches) {
   std::atomic<long> sum = 0;
   for (int batch = 0; batch < 2000; ++batch) pool.for_each(5, [&](int i, int) { sum += i; });
   EXPECT_EQ(sum, 2000 * 10);
+}
+
+TEST(ThreadPool, CountsTheTimeOfItsHelpersAlone) {
+  ThreadPool pool(3);
+  const double before = pool.helper_cpu_seconds();
+  // No worker comes back for a second task before all three have one.
+  std::atomic<int> inside = 0;
+  std::array<double, 3> used{};
+  pool.for_each(3, [&](int, int worker) {
+    const double start = thread_cpu_seconds();
+    for (++inside; inside < 3 || thread_cpu_seconds() - start < 0.02;) {
+    }
+    used[static_cast<size_t>(worker)] = thread_cpu_seconds() - start;
+  });
+  const double counted = pool.helper_cpu_seconds() - before;
+  EXPECT_GE(counted, used[1] + used[2]);
+  EXPECT_LE(counted, used[1] + used[2] + 0.01);
+  EXPECT_EQ(SerialExecutor().helper_cpu_seconds(), 0);
 }
 
 TEST(ThreadPool, RethrowsTheTaskFailureAfterAllTasksRan) {

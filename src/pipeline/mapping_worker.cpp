@@ -29,8 +29,6 @@ void MappingWorker::handle(const MappingMessage& message) {
   // Should this fail, the save at the end will say so.
   if (message.update.session) (void)save(*message.update.session);
   train(message.iterations);
-  gaussians = mapper_.gaussians().size();
-  cpu_seconds = thread_cpu_seconds();
 }
 
 Status MappingWorker::save(Archive& session) {
@@ -51,7 +49,7 @@ void MappingWorker::train(int count) {
     ++iterations;
   }
   update_figures();
-  cpu_seconds = thread_cpu_seconds();
+  cpu_seconds = thread_cpu_seconds() + executor_.helper_cpu_seconds();
 }
 
 void MappingWorker::refine(double progress) {

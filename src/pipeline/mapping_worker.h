@@ -55,7 +55,7 @@ class MappingWorker {
   std::atomic<int> iterations{0};
   std::atomic<size_t> gaussians{0};
   std::atomic<double> training_psnr{0};
-  std::atomic<double> cpu_seconds{0};  ///< Of the mapping thread itself, its helpers not included.
+  std::atomic<double> cpu_seconds{0};  ///< Of the mapping thread and its helpers.
 
   /// Appends the photorealistic map and writes the file.
   Status save(Archive& session);
