@@ -49,7 +49,7 @@ void ExposureAdjustment::match(const ImageU8& picture, const splatting::RenderRe
   if (static_cast<double>(opaque.size()) < kMinShare * static_cast<double>(plane)) return;
   for (size_t c = 0; c < 3; ++c) {
     const auto seen_at = [&](size_t i) { return picture.values()[channels * i + (channels == 3 ? c : 0)] / 255.0; };
-    const auto drawn_at = [&](size_t i) { return static_cast<double>(render.rgb[c * plane + i] / render.alpha[i]); };
+    const auto drawn_at = [&](size_t i) { return static_cast<double>(render.rgb[c * plane + i]); };
     double seen = 0, drawn = 0, error = 0;
     for (const size_t i : opaque) {
       seen += seen_at(i);

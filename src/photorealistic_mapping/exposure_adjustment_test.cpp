@@ -78,7 +78,7 @@ TEST(ExposureAdjustment, MatchesTheBrightnessOfARenderWhereItIsOpaque) {
     render.alpha[i] = i % 2 == 0 ? 0.9f : 0.1f;
     for (size_t c = 0; c < 3; ++c) {
       const float color = 0.2f + 0.4f * static_cast<float>(i) / kPlane;
-      render.rgb[c * kPlane + i] = render.alpha[i] * color;
+      render.rgb[c * kPlane + i] = i % 2 == 0 ? color : 0.1f * color;
       picture.values()[3 * i + c] = static_cast<uint8_t>(std::lround(255 * gains[c] * color));
     }
   }
@@ -119,6 +119,20 @@ TEST(ExposureAdjustment, ARenderThatDoesNotFitCountsLittle) {
   EXPECT_NEAR(matched_gain(0.7, 0), 0.7, 0.01);
   EXPECT_NEAR(matched_gain(0.7, 8), 1.0, 0.02) << "bright stripes where dark ones are drawn";
   EXPECT_NEAR(matched_gain(1.0, 3), 1.0, 0.02) << "misplaced stripes are no change of brightness";
+}
+
+TEST(ExposureAdjustment, AMapThatLetsBlackThroughButRendersThePictureIsNotDarkened) {
+  constexpr int kWidth = 16, kHeight = 16;
+  splatting::RenderResult render;
+  render.width = kWidth;
+  render.height = kHeight;
+  render.alpha.assign(kWidth * kHeight, 0.9f);
+  render.rgb.assign(3 * render.alpha.size(), 0.6f);
+  ImageU8 picture(kWidth, kHeight, 3);
+  std::ranges::fill(picture.values(), uint8_t{153});  // 0.6 of 255
+  ExposureAdjustment adjustment;
+  adjustment.match(picture, render);
+  for (const float gain : adjustment.exposure().gain) EXPECT_NEAR(gain, 1.0f, 1e-5f);
 }
 
 TEST(ExposureAdjustment, AColorWithTheExposureRemovedRendersAsThePicture) {
