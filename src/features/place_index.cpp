@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "base/check.h"
@@ -25,6 +26,20 @@ uint32_t gather_bits(const Descriptor& descriptor, const std::array<uint8_t, N>&
 }
 
 }  // namespace
+
+std::vector<Descriptor> strongest_descriptors(const Features& features) {
+  constexpr size_t kCount = 300;
+  std::vector<size_t> order(features.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  const size_t count = std::min(kCount, order.size());
+  std::ranges::partial_sort(order, order.begin() + static_cast<std::ptrdiff_t>(count), [&](size_t a, size_t b) {
+    const float ra = features.keypoints[a].response, rb = features.keypoints[b].response;
+    return ra != rb ? ra > rb : a < b;
+  });
+  std::vector<Descriptor> descriptors;
+  for (size_t i = 0; i < count; ++i) descriptors.push_back(features.descriptors[order[i]]);
+  return descriptors;
+}
 
 PlaceIndex::PlaceIndex() {
   // The keys of different tables share no bit; the signature of a table shares none with its key.

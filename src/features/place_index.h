@@ -18,6 +18,10 @@ struct PlaceCandidate {
   double score = 0;
 };
 
+/// The descriptors that a PlaceIndex files: those of the 300 strongest corners, strongest first. With them the five best
+/// of 1000 places hold the revisited one in 98 % of the revisits that brute force finds.
+std::vector<Descriptor> strongest_descriptors(const Features& features);
+
 /// Finds the images of a map that look like a given one. Needs no vocabulary: it grows with the map.
 ///
 /// Every descriptor is filed in several tables under a few of its bits, together with other bits that tell chance
@@ -27,8 +31,7 @@ class PlaceIndex {
  public:
   PlaceIndex();
 
-  /// Adds descriptors of a place; places are numbered from 0 without large gaps. The 300 of strongest response do: with
-  /// them the five best of 1000 places hold the revisited one in 98 % of the revisits that brute force finds.
+  /// Adds descriptors of a place; places are numbered from 0 without large gaps.
   void add(int place, std::span<const Descriptor> descriptors);
   /// Forgets a place; costs about what adding it did.
   void remove(int place);

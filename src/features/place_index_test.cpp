@@ -99,6 +99,24 @@ TEST(PlaceIndex, AcceptsOnlyWhatTheCallerWantsAndForgetsRemovedPlaces) {
   EXPECT_EQ(places_of(index.query(place, 10)), (std::vector<int>{0, 2, 3}));
 }
 
+TEST(PlaceIndex, FilesTheStrongestCornersInOrder) {
+  Features features;
+  for (size_t i = 0; i < 1000; ++i) {
+    Keypoint keypoint;
+    keypoint.response = static_cast<float>((i * 7) % 500);  // every value twice, shuffled
+    features.keypoints.push_back(keypoint);
+    features.descriptors.push_back(Descriptor{i});
+  }
+  const std::vector<Descriptor> strongest = strongest_descriptors(features);
+  ASSERT_EQ(strongest.size(), 300);
+  for (size_t k = 0; k < strongest.size(); ++k) {
+    const uint64_t corner = strongest[k][0];
+    EXPECT_EQ((corner * 7) % 500, 499 - k / 2);
+    EXPECT_EQ(corner >= 500, k % 2 == 1) << "the first of two equals comes first";
+  }
+  EXPECT_TRUE(strongest_descriptors({}).empty());
+}
+
 TEST(PlaceIndex, EmptyIndexAndEmptyQueryFindNothing) {
   PlaceIndex index;
   Random random(4);

@@ -6,25 +6,6 @@
 #include <cmath>
 
 namespace photoslam {
-namespace {
-
-/// The descriptors of the strongest corners; more of them find hardly more places, and cost memory and time.
-std::vector<Descriptor> strongest(const Features& features) {
-  constexpr size_t kCount = 300;
-  std::vector<size_t> order(features.size());
-  for (size_t i = 0; i < order.size(); ++i) order[i] = i;
-  const size_t count = std::min(kCount, order.size());
-  std::ranges::partial_sort(order, order.begin() + static_cast<std::ptrdiff_t>(count), [&](size_t a, size_t b) {
-    const float ra = features.keypoints[a].response, rb = features.keypoints[b].response;
-    return ra != rb ? ra > rb : a < b;
-  });
-  std::vector<Descriptor> descriptors;
-  for (size_t i = 0; i < count; ++i) descriptors.push_back(features.descriptors[order[i]]);
-  return descriptors;
-}
-
-}  // namespace
-
 void RelocalizationOptions::visit(OptionVisitor& v) {
   v.value({"max_candidates", "", 1, 1000, "Keyframes tried per lost frame; more find the place sooner and cost time."},
           max_candidates);
@@ -38,7 +19,7 @@ void RelocalizationOptions::visit(OptionVisitor& v) {
 
 void Relocalizer::update(const MapSnapshot& map) {
   for (; num_filed_ < static_cast<int>(map.keyframes.size()); ++num_filed_) {
-    places_.add(num_filed_, strongest(map.keyframe(KeyframeId(num_filed_)).keyframe.frame->features));
+    places_.add(num_filed_, strongest_descriptors(map.keyframe(KeyframeId(num_filed_)).keyframe.frame->features));
   }
   places_.remove_if([&](int place) { return map.keyframe(KeyframeId(place)).keyframe.culled; });
 }
@@ -52,7 +33,7 @@ std::optional<Relocalization> Relocalizer::relocalize(const MapSnapshot& map, co
     if (std::ranges::find(candidates, id) == candidates.end()) candidates.push_back(id);
   };
   propose(likely);
-  for (const PlaceCandidate& place : places_.query(strongest(frame.features), options_.max_candidates)) {
+  for (const PlaceCandidate& place : places_.query(strongest_descriptors(frame.features), options_.max_candidates)) {
     propose(KeyframeId(place.place));
   }
   for (const KeyframeId candidate : candidates) {

@@ -6,26 +6,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "math/median.h"
 
 namespace photoslam {
 namespace {
-
-constexpr size_t kIndexedDescriptors = 300;
-
-/// The descriptors of strongest response.
-std::vector<Descriptor> strongest_descriptors(const Features& features) {
-  std::vector<size_t> order(features.size());
-  std::iota(order.begin(), order.end(), size_t{0});
-  std::ranges::stable_sort(
-      order, [&](size_t a, size_t b) { return features.keypoints[a].response > features.keypoints[b].response; });
-  order.resize(std::min(order.size(), kIndexedDescriptors));
-  std::vector<Descriptor> descriptors;
-  for (const size_t i : order) descriptors.push_back(features.descriptors[i]);
-  return descriptors;
-}
 
 /// What was expected and found in the cells of an image.
 class CellCounts {
