@@ -18,8 +18,8 @@ struct PlaceCandidate {
   double score = 0;
 };
 
-/// The descriptors that a PlaceIndex files: those of the 300 strongest corners, strongest first. With them the five best
-/// of 1000 places hold the revisited one in 98 % of the revisits that brute force finds.
+/// The descriptors that a PlaceIndex files: those of the 300 strongest corners, strongest first. With them the five
+/// best of 1000 places hold the revisited one in 98 % of the revisits that brute force finds.
 std::vector<Descriptor> strongest_descriptors(const Features& features);
 
 /// Finds the images of a map that look like a given one. Needs no vocabulary: it grows with the map.

@@ -29,10 +29,11 @@ class ExposureAdjustment {
  public:
   splatting::Exposure exposure() const;
   /// Moves towards the gains that make a render as bright as the picture, where it is opaque; nothing changes where
-  /// that is next to nowhere. The render is compared as training compares it, not divided by its opacity: gaussians that
-  /// let a little black through have learnt to be brighter by as much. Sums of all values are compared: noise does not
-  /// bend their ratio, and neither does blur, unless values are left out by their brightness. The worse render and picture agree, the less the ratio counts, for
-  /// then it tells what the map lacks rather than the exposure. The picture has the render's size.
+  /// that is next to nowhere. The render is compared as training compares it, not divided by its opacity: gaussians
+  /// that let a little black through have learnt to be brighter by as much. Sums of all values are compared: noise does
+  /// not bend their ratio, and neither does blur, unless values are left out by their brightness. The worse render and
+  /// picture agree, the less the ratio counts, for then it tells what the map lacks rather than the exposure. The
+  /// picture has the render's size.
   void match(const ImageU8& picture, const splatting::RenderResult& render);
   /// Takes over what was learnt before; gains are positive.
   void start_from(const splatting::Exposure& exposure);
