@@ -35,20 +35,20 @@ void ExposureAdjustment::start_from(const splatting::Exposure& exposure) {
   }
 }
 
-void ExposureAdjustment::match(const ImageU8& picture, const splatting::RenderResult& render) {
+void ExposureAdjustment::match(const DepthPicture& picture, const splatting::RenderResult& render) {
   constexpr float kOpaque = 0.8f;
   constexpr double kMinShare = 0.2, kMaxLogGain = 1.4;
   constexpr double kTrustedError = 0.1;  // where gain * render is off by this share, the ratio counts by half
-  const size_t plane = render.alpha.size(), channels = static_cast<size_t>(picture.channels());
-  PHOTOSLAM_CHECK(picture.values().size() == channels * plane, "picture of {} values, render of {} pixels",
-                  picture.values().size(), plane);
+  const size_t plane = render.alpha.size(), channels = static_cast<size_t>(picture.color.channels());
+  const std::span<const uint8_t> values = picture.color.values();
+  PHOTOSLAM_CHECK(values.size() == channels * plane, "picture of {} values, render of {} pixels", values.size(), plane);
   std::vector<size_t> opaque;
   for (size_t i = 0; i < plane; ++i) {
-    if (render.alpha[i] >= kOpaque) opaque.push_back(i);
+    if (render.alpha[i] >= kOpaque && picture.has_data(i)) opaque.push_back(i);
   }
   if (static_cast<double>(opaque.size()) < kMinShare * static_cast<double>(plane)) return;
   for (size_t c = 0; c < 3; ++c) {
-    const auto seen_at = [&](size_t i) { return picture.values()[channels * i + (channels == 3 ? c : 0)] / 255.0; };
+    const auto seen_at = [&](size_t i) { return values[channels * i + (channels == 3 ? c : 0)] / 255.0; };
     const auto drawn_at = [&](size_t i) { return static_cast<double>(render.rgb[c * plane + i]); };
     double seen = 0, drawn = 0, error = 0;
     for (const size_t i : opaque) {

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "base/options.h"
-#include "image/image.h"
+#include "photorealistic_mapping/depth_picture.h"
 #include "splatting/loss.h"
 #include "splatting/renderer.h"
 
@@ -34,7 +34,7 @@ class ExposureAdjustment {
   /// not bend their ratio, and neither does blur, unless values are left out by their brightness. The worse render and
   /// picture agree, the less the ratio counts, for then it tells what the map lacks rather than the exposure. The
   /// picture has the render's size.
-  void match(const ImageU8& picture, const splatting::RenderResult& render);
+  void match(const DepthPicture& picture, const splatting::RenderResult& render);
   /// Takes over what was learnt before; gains are positive.
   void start_from(const splatting::Exposure& exposure);
 

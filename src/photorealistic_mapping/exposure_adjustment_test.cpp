@@ -72,14 +72,15 @@ TEST(ExposureAdjustment, MatchesTheBrightnessOfARenderWhereItIsOpaque) {
   render.height = kHeight;
   render.rgb.resize(3 * kPlane);
   render.alpha.resize(kPlane);
-  ImageU8 picture(kWidth, kHeight, 3);
+  DepthPicture picture;
+  picture.color = ImageU8(kWidth, kHeight, 3);
   const float gains[3] = {0.8f, 1.1f, 1.3f};
   for (size_t i = 0; i < kPlane; ++i) {
     render.alpha[i] = i % 2 == 0 ? 0.9f : 0.1f;
     for (size_t c = 0; c < 3; ++c) {
       const float color = 0.2f + 0.4f * static_cast<float>(i) / kPlane;
       render.rgb[c * kPlane + i] = i % 2 == 0 ? color : 0.1f * color;
-      picture.values()[3 * i + c] = static_cast<uint8_t>(std::lround(255 * gains[c] * color));
+      picture.color.values()[3 * i + c] = static_cast<uint8_t>(std::lround(255 * gains[c] * color));
     }
   }
   ExposureAdjustment adjustment;
@@ -100,13 +101,14 @@ double matched_gain(double gain, int shift) {
   render.height = kHeight;
   render.alpha.assign(kWidth * kHeight, 1.0f);
   render.rgb.resize(3 * render.alpha.size());
-  ImageU8 picture(kWidth, kHeight, 3);
+  DepthPicture picture;
+  picture.color = ImageU8(kWidth, kHeight, 3);
   const auto stripes = [&](int x) { return (x + kStripe) / kStripe % 2 == 0 ? 0.2 : 0.9; };
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       for (size_t c = 0; c < 3; ++c) {
         render.rgb[c * render.alpha.size() + static_cast<size_t>(y * kWidth + x)] = static_cast<float>(stripes(x));
-        picture(x, y, static_cast<int>(c)) = static_cast<uint8_t>(std::lround(255 * gain * stripes(x + shift)));
+        picture.color(x, y, static_cast<int>(c)) = static_cast<uint8_t>(std::lround(255 * gain * stripes(x + shift)));
       }
     }
   }
@@ -128,11 +130,33 @@ TEST(ExposureAdjustment, AMapThatLetsBlackThroughButRendersThePictureIsNotDarken
   render.height = kHeight;
   render.alpha.assign(kWidth * kHeight, 0.9f);
   render.rgb.assign(3 * render.alpha.size(), 0.6f);
-  ImageU8 picture(kWidth, kHeight, 3);
-  std::ranges::fill(picture.values(), uint8_t{153});  // 0.6 of 255
+  DepthPicture picture;
+  picture.color = ImageU8(kWidth, kHeight, 3);
+  std::ranges::fill(picture.color.values(), uint8_t{153});  // 0.6 of 255
   ExposureAdjustment adjustment;
   adjustment.match(picture, render);
   for (const float gain : adjustment.exposure().gain) EXPECT_NEAR(gain, 1.0f, 1e-5f);
+}
+
+TEST(ExposureAdjustment, PixelsWithoutDataAreNoDarkness) {
+  constexpr int kWidth = 16, kHeight = 16;
+  splatting::RenderResult render;
+  render.width = kWidth;
+  render.height = kHeight;
+  render.alpha.assign(kWidth * kHeight, 1.0f);
+  render.rgb.assign(3 * render.alpha.size(), 0.5f);
+  DepthPicture picture;
+  picture.color = ImageU8(kWidth, kHeight, 3);
+  picture.mask = ImageU8(kWidth, kHeight);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 4; x < kWidth; ++x) {
+      picture.mask(x, y) = 255;
+      for (int c = 0; c < 3; ++c) picture.color(x, y, c) = 102;  // 0.4; the columns without data stay black
+    }
+  }
+  ExposureAdjustment adjustment;
+  adjustment.match(picture, render);
+  for (const float gain : adjustment.exposure().gain) EXPECT_NEAR(gain, 0.8f, 1e-5f);
 }
 
 TEST(ExposureAdjustment, AColorWithTheExposureRemovedRendersAsThePicture) {

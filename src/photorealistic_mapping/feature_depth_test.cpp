@@ -63,7 +63,7 @@ TEST(FeatureDepths, TakesTheBestSourceForEachFeature) {
   chunk->add(0, landmark);
   map.landmark_chunks.push_back(chunk);
   map.num_landmarks = 1;
-  DepthPicture picture{{64, 32, 50, 50, 32, 16}, {}, ImageF(64, 32)};
+  DepthPicture picture{{64, 32, 50, 50, 32, 16}, {}, ImageF(64, 32), {}};
   picture.depth(15, 6) = 2.5f;  // the half-size pixel of (30, 12)
   picture.depth(10, 6) = 7.0f;  // that of (20, 12), which the sensor has measured
 

@@ -24,7 +24,7 @@ constexpr int kSeedingFactor = 2;  // seeds are made on the half-size image: che
 /// The picture that seeds are made of; without a depth image its depth is empty.
 DepthPicture make_picture(const CameraView& full, double metres_per_depth_unit) {
   CameraView small = shrink(full, kSeedingFactor);
-  DepthPicture picture{small.camera, std::move(small.color), {}};
+  DepthPicture picture{small.camera, std::move(small.color), {}, std::move(small.mask)};
   if (small.depth.empty()) return picture;
   picture.depth = ImageF(small.camera.width, small.camera.height);
   std::ranges::transform(small.depth.values(), picture.depth.values().begin(),
@@ -188,7 +188,7 @@ void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, c
 double PhotorealisticMapper::megabytes(const TrainingView& view) const {
   const splatting::TargetImage& target = view.target;
   size_t bytes = view.picture.color.values().size() + view.picture.depth.values().size_bytes() +
-                 view.right.values().size() + target.depth().size_bytes();
+                 view.picture.mask.values().size() + view.right.values().size() + target.depth().size_bytes();
   for (int level = 0; level <= schedule_.coarsest_level(); ++level)
     bytes += static_cast<size_t>((target.width() >> level) * (target.height() >> level)) * (target.has_mask() ? 4 : 3);
   return 1e-6 * static_cast<double>(bytes);
@@ -256,6 +256,9 @@ void PhotorealisticMapper::sweep_picture(const MapSnapshot& map, size_t index, E
   if (others.empty()) return;
   const ImageU8 grey = to_grey(view.picture.color);
   view.picture.depth = sweep_depth(options_.depth.sweep, grey, view.picture.camera, others, *range, executor);
+  for (size_t i = 0; i < view.picture.depth.values().size(); ++i) {
+    if (!view.picture.has_data(i)) view.picture.depth.values()[i] = 0;
+  }
 }
 
 SE3 PhotorealisticMapper::view_from_world(size_t view) const {
@@ -282,7 +285,7 @@ void PhotorealisticMapper::seed(size_t index, int cell, double min_color_error, 
   render_picture(index, executor);
   const bool unused = schedule_.uses(static_cast<int>(index)) == 0;
   if (options_.exposure.enabled && index > 0 && unused && !view.exposure_is_known) {
-    view.exposure.match(picture.color, render_);
+    view.exposure.match(picture, render_);
   }
   const splatting::Exposure exposure = view.exposure.exposure();
   if (options_.exposure.enabled) apply(exposure, render_);

@@ -20,6 +20,7 @@ struct Cell {
   Vec3 color = Vec3::Zero();           // mean, [0, 1]
   double color_error = 0;              // squared difference of the means, summed over channels
   double transmittance = 1;
+  bool has_data = false;
   double rendered_depth = 0;  // 0 where next to nothing was drawn
   double depth = 0;           // measured [m]; 0 = none
   bool measured = false;      // depth is the cell's own
@@ -60,9 +61,12 @@ Cell summarize_cell(const DepthPicture& view, const splatting::RenderResult& ren
   const size_t plane = static_cast<size_t>(view.camera.width) * static_cast<size_t>(view.camera.height);
   Vec3 rendered = Vec3::Zero();
   double alpha = 0, depth = 0;
+  int pixels = 0;
   for (int y = cell.y0; y < cell.y1; ++y) {
     for (int x = cell.x0; x < cell.x1; ++x) {
       const size_t i = static_cast<size_t>(y) * static_cast<size_t>(view.camera.width) + static_cast<size_t>(x);
+      if (!view.has_data(i)) continue;
+      ++pixels;
       cell.color += pixel_color(view.color, x, y);
       rendered += Vec3(static_cast<double>(render.rgb[i]), static_cast<double>(render.rgb[plane + i]),
                        static_cast<double>(render.rgb[2 * plane + i]));
@@ -70,7 +74,8 @@ Cell summarize_cell(const DepthPicture& view, const splatting::RenderResult& ren
       depth += static_cast<double>(render.depth[i]);
     }
   }
-  const double pixels = (cell.x1 - cell.x0) * (cell.y1 - cell.y0);
+  cell.has_data = 4 * pixels >= (cell.x1 - cell.x0) * (cell.y1 - cell.y0);
+  if (!cell.has_data) return cell;
   cell.color /= pixels;
   cell.color_error = (rendered / pixels - cell.color).squaredNorm();
   cell.transmittance = 1.0 - alpha / pixels;
@@ -164,7 +169,8 @@ void SeedingOptions::visit(OptionVisitor& v) {
   v.value({"max_stretch", "", 1.0, 20.0, "Largest elongation of a disc on a surface seen at a grazing angle."},
           max_stretch);
   v.value({"opacity", "", 0.02, 0.98, "Opacity at birth."}, opacity);
-  v.value({"min_transmittance", "", 0.0, 1.0, "Cells that the map leaves more transparent than this are seeded, …"},
+  v.value({"min_transmittance", "", 0.0, 1.0,
+           "Cells and features that the map leaves more transparent than this are seeded, …"},
           min_transmittance);
   v.value({"min_depth_ratio", "", 0.0, 1.0, "… those measured nearer than this share of the rendered depth, …"},
           min_depth_ratio);
@@ -172,7 +178,8 @@ void SeedingOptions::visit(OptionVisitor& v) {
           min_color_error);
   v.value({"feature_sigma_px", "px", 0.3, 20.0, "Standard deviation of a gaussian at an inactive feature."},
           feature_sigma_px);
-  v.value({"feature_color_error", "", 0.0, 3.0, "Features whose pixel is off by less are not seeded."},
+  v.value({"feature_color_error", "", 0.0, 3.0,
+           "Features that the map covers and whose pixel is off by less are not seeded."},
           feature_color_error);
 }
 
@@ -194,7 +201,7 @@ std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const
   for (int row = 0; row < grid.rows; ++row) {
     for (int column = 0; column < grid.columns; ++column) {
       const Cell& cell = grid.at(column, row);
-      if (!(cell.depth > 0)) continue;
+      if (!(cell.depth > 0) || !cell.has_data) continue;
       const bool uncovered = cell.transmittance > options.min_transmittance;
       const bool in_front = cell.rendered_depth > 0 && cell.depth < options.min_depth_ratio * cell.rendered_depth;
       const bool wrong_color = cell.color_error > min_color_error;
@@ -219,10 +226,12 @@ std::vector<splatting::Gaussian> seed_features(const SeedingOptions& options, co
     const int x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));
     if (x < 0 || y < 0 || x >= view.camera.width || y >= view.camera.height) continue;
     const size_t i = static_cast<size_t>(y) * static_cast<size_t>(view.camera.width) + static_cast<size_t>(x);
+    if (!view.has_data(i)) continue;
     const Vec3 color = pixel_color(view.color, x, y);
     const Vec3 rendered(static_cast<double>(render.rgb[i]), static_cast<double>(render.rgb[plane + i]),
                         static_cast<double>(render.rgb[2 * plane + i]));
-    if ((rendered - color).squaredNorm() < options.feature_color_error) continue;
+    const bool uncovered = 1.0 - static_cast<double>(render.alpha[i]) > options.min_transmittance;
+    if (!uncovered && (rendered - color).squaredNorm() < options.feature_color_error) continue;
     const auto depth = static_cast<double>(feature.depth);
     const Vec3 mean = view.camera.unproject(pixel, depth);
     const double sigma = options.feature_sigma_px / factor * depth / view.camera.fx;

@@ -34,15 +34,16 @@ struct SeedingOptions {
 ///
 /// A cell of the image becomes one gaussian, a disc on the measured surface as large as its cell, where `render` (of
 /// the present map, same camera) does not explain it: mostly transparent, behind the measurement, or of another colour.
-/// Cells without depth take the nearest measured one, and only where the map is transparent.
+/// Cells without depth take the nearest measured one, and only where the map is transparent. Cells without data in
+/// three quarters of their pixels are left out.
 ///
 /// `cell` is in pixels of `view`.
 std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const DepthPicture& view,
                                             const splatting::RenderResult& render, int cell, double min_color_error);
 
 /// Geometry-based densification (paper, Sec. 3.3.1): gaussians at features, the places of complex texture, as large as
-/// their pixel's footprint, where the render of the present map does not explain the pixel. `view` is the full image
-/// shrunk by `factor`.
+/// their pixel's footprint, where the render of the present map is mostly transparent or of another colour. `view` is
+/// the full image shrunk by `factor`.
 std::vector<splatting::Gaussian> seed_features(const SeedingOptions& options, const DepthPicture& view, int factor,
                                                const splatting::RenderResult& render,
                                                std::span<const DepthPixel> features);

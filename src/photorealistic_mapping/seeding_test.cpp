@@ -71,6 +71,27 @@ TEST(SeedCells, OneDiscPerCellOnTheMeasuredSurface) {
   }
 }
 
+TEST(SeedCells, NothingIsSeededWhereThereIsNoData) {
+  const SeedingOptions options;
+  Scene scene(2.0);
+  scene.view.mask = ImageU8(64, 48, 1, 255);
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 0; x < 18; ++x) {  // four columns of cells, and half of the fifth
+      scene.view.mask(x, y) = 0;
+      scene.view.depth(x, y) = 0;
+      for (int c = 0; c < 3; ++c) scene.view.color(x, y, c) = 0;
+    }
+  }
+  const auto seeds = seed_cells(options, scene.view, scene.render, kCell, options.min_color_error);
+  ASSERT_EQ(seeds.size(), 12u * 12u);
+  const double expected[3] = {0.2, 0.4, 0.8};
+  for (const auto& g : seeds) {
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(0.5 + 0.28209479 * g.sh[0][c], expected[c], 1e-5) << "no black mixed in";
+  }
+  const DepthPixel features[] = {{10, 24, 2.0f, false}, {90, 24, 2.0f, false}};  // pixels of the full image
+  EXPECT_EQ(seed_features(options, scene.view, 2, scene.render, features).size(), 1u);
+}
+
 TEST(SeedCells, TiltedSurfacesGetDiscsAlongThem) {
   const SeedingOptions options;
   const double slope = 0.4;
@@ -132,6 +153,13 @@ TEST(SeedFeatures, BothDensificationsCanBeSwitchedOff) {
   EXPECT_TRUE(seed_cells(options, scene.view, scene.render, kCell, options.min_color_error).empty());
   const std::vector<DepthPixel> features = {{20.5f, 20.5f, 2.0f, true}, {80.5f, 60.5f, 2.0f, false}};
   EXPECT_EQ(seed_features(options, scene.view, 2, scene.render, features).size(), 1u) << "landmarks stay";
+}
+
+TEST(SeedFeatures, ADarkPixelBeforeAnEmptyMapIsNotExplained) {
+  Scene scene(2.0);
+  std::ranges::fill(scene.view.color.values(), uint8_t{0});
+  const std::vector<DepthPixel> features = {{20.5f, 20.5f, 2.0f, true}};
+  EXPECT_EQ(seed_features({}, scene.view, 2, scene.render, features).size(), 1u) << "an empty map renders black too";
 }
 
 TEST(SeedFeatures, OnlyPixelsThatLookWrongGetOne) {
