@@ -60,6 +60,9 @@ void PhotorealisticOptions::visit(OptionVisitor& v) {
       opacity_weight);
   v.value({"sh_degree", "", 0, 3, "Degree of the spherical harmonics that make colours depend on the view."},
           sh_degree);
+  v.value({"sh_interval", "iterations", 0, 100000,
+           "Training begins with constant colours and adds a degree each time so many have passed; 0: all at once."},
+          sh_interval);
   v.value({"near_m", "m", 1e-4, 1.0, "Gaussians nearer to the camera are not drawn."}, near_m);
   v.value(
       {"reseed_interval", "iterations", 0, 100000, "Between two rounds of dense seeding in old keyframes; 0: never."},
@@ -328,6 +331,8 @@ splatting::TrainOptions PhotorealisticMapper::train_options(std::optional<double
   const double decay = progress ? std::pow(options_.rates.final_factor, *progress) : 1.0;
   splatting::TrainOptions train;
   train.render = render_options();
+  if (options_.sh_interval > 0)
+    train.render.sh_degree = std::min(iteration_ / options_.sh_interval, options_.sh_degree);
   const auto rate = [&](double value) { return static_cast<float>(decay * value); };
   train.rates = {.mean = rate(options_.rates.mean * scene_depth_),
                  .rotation = rate(options_.rates.rotation),

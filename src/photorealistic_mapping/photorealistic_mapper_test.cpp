@@ -80,6 +80,31 @@ TEST_F(PhotorealisticMapperTest, TrainingImprovesTheRender) {
   EXPECT_EQ(mapper.num_iterations(), 151);
 }
 
+TEST_F(PhotorealisticMapperTest, ColorsBecomeViewDependentOneDegreeAfterTheOther) {
+  PhotorealisticOptions options;
+  options.sh_degree = 2;
+  options.sh_interval = 10;
+  options.poses.enabled = false;
+  PhotorealisticMapper mapper(options, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
+  for (const double x : {0.0, 0.3}) add(mapper, at(x), stereo(at(x)));
+  // The highest coefficient that is not zero in any gaussian: degree d has those below (d + 1)^2.
+  const auto highest = [&] {
+    int found = 0;
+    mapper.gaussians().for_each([&](size_t i) {
+      const splatting::Gaussian g = mapper.gaussians().get(i);
+      for (int k = found + 1; k < splatting::kNumShCoefficients; ++k) {
+        for (const float value : g.sh[k]) found = value == 0 ? found : k;
+      }
+    });
+    return found;
+  };
+  const int expected[] = {0, 3, 8, 8};
+  for (const int k : expected) {
+    for (int i = 0; i < 10; ++i) mapper.train({}, executor_);
+    EXPECT_EQ(highest(), k) << mapper.num_iterations() << " iterations";
+  }
+}
+
 TEST_F(PhotorealisticMapperTest, ExposureIsToldFromColor) {
   const std::vector<double> gains = {0.8, 0.95, 0.7, 0.85, 0.65};
   double psnr[2];

@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
+#include <utility>
+#include <vector>
 
 #include "math/median.h"
 #include "math/se3.h"
@@ -24,6 +25,7 @@ struct Cell {
   double rendered_depth = 0;  // 0 where next to nothing was drawn
   double depth = 0;           // measured [m]; 0 = none
   bool measured = false;      // depth is the cell's own
+  int distance = 0;           // to the cell whose depth it is [cells]
   Vec2 center() const { return {0.5 * (x0 + x1 - 1), 0.5 * (y0 + y1 - 1)}; }
 };
 
@@ -85,24 +87,28 @@ Cell summarize_cell(const DepthPicture& view, const splatting::RenderResult& ren
   return cell;
 }
 
-/// Gives cells without a measurement the depth of the nearest cell that has one (breadth first, fixed order).
+/// Cells without a measurement take their depth from the nearest cells that have one, ring by ring; of several the
+/// farthest, for what hides from one of two views, or is the sky behind a tree, lies behind.
 void fill_missing_depth(CellGrid& grid) {
-  std::deque<std::pair<int, int>> front;
+  std::vector<std::pair<int, int>> ring, next;
   for (int row = 0; row < grid.rows; ++row) {
     for (int column = 0; column < grid.columns; ++column) {
-      if (grid.at(column, row).measured) front.emplace_back(column, row);
+      if (grid.at(column, row).measured) ring.emplace_back(column, row);
     }
   }
-  while (!front.empty()) {
-    const auto [column, row] = front.front();
-    front.pop_front();
-    for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-      if (!grid.contains(column + dx, row + dy)) continue;
-      Cell& neighbour = grid.at(column + dx, row + dy);
-      if (neighbour.depth > 0) continue;
-      neighbour.depth = grid.at(column, row).depth;
-      front.emplace_back(column + dx, row + dy);
+  for (int distance = 1; !ring.empty(); ++distance) {
+    next.clear();
+    for (const auto& [column, row] : ring) {
+      for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+        if (!grid.contains(column + dx, row + dy)) continue;
+        Cell& neighbour = grid.at(column + dx, row + dy);
+        if (neighbour.depth > 0 && neighbour.distance < distance) continue;
+        if (!(neighbour.depth > 0)) next.emplace_back(column + dx, row + dy);
+        neighbour.distance = distance;
+        neighbour.depth = std::max(neighbour.depth, grid.at(column, row).depth);
+      }
     }
+    std::swap(ring, next);
   }
 }
 

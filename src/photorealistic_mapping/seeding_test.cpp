@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "math/se3.h"
 
@@ -137,6 +138,23 @@ TEST(SeedCells, HolesTakeTheNearestDepthOnlyWhereNothingIsDrawn) {
   scene.render_exactly();
   std::ranges::fill(scene.render.rgb, 0.0f);  // wrong colour everywhere
   EXPECT_EQ(seed_cells(options, scene.view, scene.render, kCell, options.min_color_error).size(), 8u * 12u);
+}
+
+TEST(SeedCells, AHoleBetweenNearAndFarIsFar) {
+  Scene scene(2.0);
+  // A tree, columns of cells 0 to 5; behind it a wall from column 8 on, and between them the sky.
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 0; x < 64; ++x) scene.view.depth(x, y) = x < 6 * kCell ? 1.0f : x < 9 * kCell ? 0.0f : 5.0f;
+  }
+  std::map<int, float> depth_of_column;
+  for (const auto& g : seed_cells({}, scene.view, scene.render, kCell, 0.1)) {
+    const double x = static_cast<double>(g.mean[0] / g.mean[2]) * scene.view.camera.fx + scene.view.camera.cx;
+    depth_of_column[static_cast<int>(x) / kCell] = g.mean[2];
+  }
+  EXPECT_NEAR(depth_of_column[5], 1, 1e-5);
+  EXPECT_NEAR(depth_of_column[6], 1, 1e-5) << "the tree is nearer to it";
+  EXPECT_NEAR(depth_of_column[7], 5, 1e-5) << "as near to either";
+  EXPECT_NEAR(depth_of_column[8], 5, 1e-5);
 }
 
 TEST(SeedCells, WithoutAnyDepthThereIsNothingToSeed) {
