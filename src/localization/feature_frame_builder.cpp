@@ -21,13 +21,42 @@ void DepthOptions::visit(OptionVisitor& v) {
 }
 
 FeatureFrameBuilder::FeatureFrameBuilder(const OrbOptions& orb, const DepthOptions& depth, const StereoOptions& stereo,
-                                         const PinholeCamera& camera, const DepthSensor& sensor)
+                                         const PinholeCamera& camera, const DepthSensor& sensor, ImageU8 mask)
     : orb_options_(orb),
       depth_options_(depth),
       sensor_(sensor),
       bf_(camera.fx * (sensor.metres_per_unit > 0 ? depth.virtual_baseline_m : sensor.baseline_m)),
+      mask_(std::move(mask)),
       extractor_(orb),
-      stereo_matcher_(stereo) {}
+      stereo_matcher_(stereo) {
+  if (std::ranges::all_of(mask_.values(), [](uint8_t has_data) { return has_data != 0; })) mask_ = {};
+}
+
+/// Whether the patch that is described reaches into what has no data: by eight points of its rim, which suffice for a
+/// smooth border. What lies outside the image is none.
+bool FeatureFrameBuilder::is_beside_no_data(const Keypoint& keypoint) const {
+  constexpr double kPatchRadius = 16;  // of orientation and descriptor, on the keypoint's level [px]
+  const double radius = kPatchRadius * std::pow(orb_options_.scale_factor, keypoint.octave);
+  for (int i = 0; i < 8; ++i) {
+    const double angle = i * std::numbers::pi / 4;
+    const auto x = std::lround(static_cast<double>(keypoint.x) + radius * std::cos(angle));
+    const auto y = std::lround(static_cast<double>(keypoint.y) + radius * std::sin(angle));
+    if (x < 0 || y < 0 || x >= mask_.width() || y >= mask_.height()) continue;
+    if (mask_(static_cast<int>(x), static_cast<int>(y)) == 0) return true;
+  }
+  return false;
+}
+
+void FeatureFrameBuilder::discard_beside_no_data(Features& features) const {
+  size_t kept = 0;
+  for (size_t i = 0; i < features.size(); ++i) {
+    if (is_beside_no_data(features.keypoints[i])) continue;
+    features.keypoints[kept] = features.keypoints[i];
+    features.descriptors[kept++] = features.descriptors[i];
+  }
+  features.keypoints.resize(kept);
+  features.descriptors.resize(kept);
+}
 
 /// σ of the depth at 1 m [m], taken to grow with the square of the depth: from second differences along rows, which
 /// slanted surfaces do not have. By their median, so that edges do not count.
@@ -95,6 +124,7 @@ std::shared_ptr<const FeatureFrame> FeatureFrameBuilder::build(FrameId id, int64
   frame->frame = id;
   frame->timestamp_ns = timestamp_ns;
   extractor_.extract(grey, frame->features);
+  if (!mask_.empty()) discard_beside_no_data(frame->features);
   const size_t n = frame->size();
   frame->depth.resize(n, 0.0f);
   frame->observations.resize(n);

@@ -29,18 +29,22 @@ struct DepthSensor {
 /// Turns the rectified images of a moment into features with observations. Keeps its buffers between calls.
 class FeatureFrameBuilder {
  public:
+  /// `mask` is 0 where images have no data after undistortion; empty: they have everywhere.
   FeatureFrameBuilder(const OrbOptions& orb, const DepthOptions& depth, const StereoOptions& stereo,
-                      const PinholeCamera& camera, const DepthSensor& sensor);
+                      const PinholeCamera& camera, const DepthSensor& sensor, ImageU8 mask = {});
 
   /// fx * baseline [px m], real for stereo, virtual with depth images; 0 when nothing measures depth.
   double bf() const { return bf_; }
 
   /// `depth` and `right` may be empty; else they have the size of `grey`. Keypoints on depth edges and holes, or
-  /// without a match in the right image, get no depth.
+  /// without a match in the right image, get no depth. What lies beside pixels without data is no feature: the end of
+  /// the data moves with the camera.
   std::shared_ptr<const FeatureFrame> build(FrameId id, int64_t timestamp_ns, const ImageU8& grey,
                                             const ImageU16& depth, const ImageU8& right = {});
 
  private:
+  bool is_beside_no_data(const Keypoint& keypoint) const;
+  void discard_beside_no_data(Features& features) const;
   double depth_noise(const ImageU16& depth);
   float depth_at(const ImageU16& depth, double noise, const Keypoint& keypoint) const;
   void add_measured_depth(const ImageU16& depth, FeatureFrame& frame);
@@ -50,6 +54,7 @@ class FeatureFrameBuilder {
   DepthOptions depth_options_;
   DepthSensor sensor_;
   double bf_;
+  ImageU8 mask_;
   OrbExtractor extractor_;
   GreyPyramid right_pyramid_;
   StereoMatcher stereo_matcher_;

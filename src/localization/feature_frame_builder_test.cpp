@@ -95,5 +95,28 @@ TEST(FeatureFrameBuilderTest, KeypointsBesideAHoleHaveNoDepth) {
   EXPECT_GE(beside, 5);
 }
 
+TEST(FeatureFrameBuilderTest, TheEndOfTheDataIsNoFeature) {
+  // No data outside a circle, as undistortion leaves it; the blocks are cut there, which makes corners.
+  const auto distance = [](double x, double y) { return std::hypot(x - 159.5, y - 119.5); };
+  constexpr double kRadius = 110;
+  ImageU8 image = blocks(), mask(kCamera.width, kCamera.height, 1, 255);
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      if (distance(x, y) > kRadius) image(x, y) = mask(x, y) = 0;
+    }
+  }
+  const auto farthest = [&](const ImageU8& known) {
+    FeatureFrameBuilder builder({}, {}, {}, kCamera, {}, known);
+    const auto frame = builder.build(FrameId(0), 0, image, {});
+    EXPECT_GT(frame->size(), 300u);
+    EXPECT_EQ(frame->features.descriptors.size(), frame->size());
+    double most = 0;
+    for (const Keypoint& k : frame->features.keypoints) most = std::max(most, distance(double{k.x}, double{k.y}));
+    return most;
+  };
+  EXPECT_GT(farthest({}), kRadius - 4) << "without the mask there are corners at the border";
+  EXPECT_LT(farthest(mask), kRadius - 13);
+}
+
 }  // namespace
 }  // namespace photoslam

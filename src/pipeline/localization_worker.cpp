@@ -28,7 +28,8 @@ LocalizationWorker::LocalizationWorker(const SystemOptions& options, const RunSe
     : settings_(settings),
       metres_per_depth_unit_(info.metres_per_depth_unit),
       rectifier_(info),
-      builder_(options.features, options.depth, options.stereo, camera(), depth_sensor(info, rectifier_.baseline_m())),
+      builder_(options.features, options.depth, options.stereo, camera(), depth_sensor(info, rectifier_.baseline_m()),
+               rectifier_.mask()),
       tracker_(options.localization, options.features, camera(), builder_.bf()) {}
 
 MapperSensor LocalizationWorker::sensor() const {
