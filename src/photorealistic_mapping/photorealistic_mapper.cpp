@@ -383,12 +383,10 @@ void PhotorealisticMapper::maintain(std::optional<double> progress, Executor& ex
     seed(static_cast<size_t>(view), options_.seeding.cell_px / 2, options_.reseed_color_error, {}, executor);
   }
   if (iteration_ % options_.densification.interval != 0) return;
-  if (progress && options_.densification.enabled) {
-    if (growing) {
-      densify(options_.densification, scene_depth_, random_, model_);
-    } else {
-      prune_idle(options_.densification, model_);
-    }
+  if (progress && growing && options_.densification.enabled) {
+    densify(options_.densification, scene_depth_, random_, model_);
+  } else {
+    prune_idle(options_.densification, model_);
   }
   prune(options_.densification, scene_depth_, model_);
 }

@@ -105,6 +105,26 @@ TEST_F(PhotorealisticMapperTest, ColorsBecomeViewDependentOneDegreeAfterTheOther
   }
 }
 
+TEST_F(PhotorealisticMapperTest, WhatNoPictureNeedsIsRemovedWhileFramesArrive) {
+  PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
+  for (const double x : {0.0, 0.3}) add(mapper, at(x), stereo(at(x)));
+  splatting::Gaussian hidden{};
+  hidden.mean[2] = 9;  // behind the wall at 4 m
+  hidden.rotation[0] = 1;
+  for (float& s : hidden.log_scale) s = -3;
+  mapper.add_gaussians(std::vector(20, hidden));
+  const auto num_hidden = [&] {
+    int count = 0;
+    mapper.gaussians().for_each([&](size_t i) { count += mapper.gaussians().get(i).mean[2] > 8; });
+    return count;
+  };
+  const size_t before = mapper.gaussians().size();
+  ASSERT_EQ(num_hidden(), 20);
+  for (int i = 0; i < 200; ++i) mapper.train({}, executor_);
+  EXPECT_EQ(num_hidden(), 0);
+  EXPECT_GT(mapper.gaussians().size(), before / 2) << "the wall stays";
+}
+
 TEST_F(PhotorealisticMapperTest, ExposureIsToldFromColor) {
   const std::vector<double> gains = {0.8, 0.95, 0.7, 0.85, 0.65};
   double psnr[2];
