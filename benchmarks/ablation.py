@@ -59,7 +59,7 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.output.mkdir(parents=True, exist_ok=True)
 
-    lines = ["| sensor | variant | PSNR dB | SSIM | tracking frames/s | map MB |", "|---|---|---|---|---|---|"]
+    lines = ["| sensor | variant | PSNR dB | SSIM | rendered frames/s | map MB |", "|---|---|---|---|---|---|"]
     for sensor in arguments.sensors:
         for name, settings in variants().items():
             reports = []
@@ -67,7 +67,7 @@ def main() -> None:
                 folder = arguments.output / f"{sensor}-{name.replace(', ', '-').replace(' ', '-')}-{seed}"
                 reports.append(run(arguments, sensor, settings, seed, folder))
             figures = [mean_and_spread([report[group][key] for report in reports])
-                       for group, key in (("image", "psnr_db"), ("image", "ssim"), ("tracking", "fps"),
+                       for group, key in (("image", "psnr_db"), ("image", "ssim"), ("render", "fps"),
                                           ("map", "size_mb"))]
             lines.append(f"| {sensor} | {name} | " + " | ".join(figures) + " |")
             print(lines[-1], flush=True)
