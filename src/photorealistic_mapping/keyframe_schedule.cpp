@@ -31,6 +31,9 @@ void ScheduleOptions::visit(OptionVisitor& v) {
   v.value({"online_pixels", "", 1, 1000000000,
            "While frames arrive, the finest level is the first whose pictures have no more pixels than this."},
           online_pixels);
+  v.value({"online_uses", "", 0, 1000000,
+           "… and the next finer one after each so many training steps of the keyframe; 0: never."},
+          online_uses);
   v.value({"newest_probability", "", 0.0, 1.0, "Share of the steps that go to the newest keyframe."},
           newest_probability);
   v.value({"worse_probability", "", 0.0, 1.0,
@@ -107,7 +110,8 @@ KeyframeSchedule::Choice KeyframeSchedule::next(bool refining) {
     choice.view = worse ? draw_worse() : draw();
   }
   int& uses = uses_[static_cast<size_t>(choice.view)];
-  const int finest = refining ? 0 : online_level_;
+  int finest = refining ? 0 : online_level_;
+  if (options_.online_uses > 0) finest = std::max(0, finest - uses / options_.online_uses);
   choice.level = std::max(finest, coarsest_level_ - uses / options_.uses_per_level);
   ++uses;
   return choice;

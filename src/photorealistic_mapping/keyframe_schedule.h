@@ -18,6 +18,7 @@ struct ScheduleOptions {
   int start_pixels = 32000;
   int uses_per_level = 4;
   int online_pixels = 130000;
+  int online_uses = 32;
   double newest_probability = 0.2;
   double worse_probability = 0;
   double seam_px = 2.0;
@@ -29,8 +30,9 @@ struct ScheduleOptions {
 ///
 /// Each keyframe starts at the coarsest level n and moves down one level every uses_per_level uses, until it reaches
 /// the finest one allowed: the full image in refinement, less while frames arrive where that is too costly. What counts
-/// is how large the pictures are, so the levels follow from that. Keyframes at which a correction of the map left a
-/// seam go before all others.
+/// is how large the pictures are, so the levels follow from that. When online_uses have taught what a smaller picture
+/// can teach, the next finer level is allowed while frames arrive, too. Keyframes at which a correction of the map left
+/// a seam go before all others.
 class KeyframeSchedule {
  public:
   struct Choice {
@@ -42,7 +44,7 @@ class KeyframeSchedule {
 
   /// n in Eq. (5).
   int coarsest_level() const { return coarsest_level_; }
-  /// The finest one while frames arrive.
+  /// The finest one while frames arrive, at first.
   int online_level() const { return online_level_; }
 
   void add_view();

@@ -24,12 +24,26 @@ TEST(KeyframeSchedule, LevelsFallWithUseAsInEquationFive) {
 TEST(KeyframeSchedule, OnlineStopsAtItsLevelAndRefinementGoesOn) {
   ScheduleOptions options;
   options.online_pixels = 320 * 240;
+  options.online_uses = 0;
   KeyframeSchedule schedule(options, 640, 480, 1);
   schedule.add_view();
   int finest_online = 3;
   for (int i = 0; i < 50; ++i) finest_online = std::min(finest_online, schedule.next(false).level);
   EXPECT_EQ(finest_online, 1);
   EXPECT_EQ(schedule.next(true).level, 0);
+}
+
+TEST(KeyframeSchedule, OnlineGoesOnToFinerLevelsAfterManyUses) {
+  ScheduleOptions options;
+  options.start_pixels = 160 * 120;
+  options.uses_per_level = 2;
+  options.online_pixels = 160 * 120;
+  options.online_uses = 5;
+  KeyframeSchedule schedule(options, 640, 480, 1);
+  schedule.add_view();
+  std::vector<int> levels;
+  for (int i = 0; i < 13; ++i) levels.push_back(schedule.next(false).level);
+  EXPECT_EQ(levels, (std::vector{2, 2, 2, 2, 2, 1, 1, 1, 1, 1, 0, 0, 0}));
 }
 
 TEST(KeyframeSchedule, LevelsFollowTheSizeOfThePicture) {

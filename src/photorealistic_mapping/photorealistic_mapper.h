@@ -40,8 +40,8 @@ struct PhotorealisticOptions {
   double ssim_weight = 0.2;
   double depth_weight = 0.0;
   double opacity_weight = 0.0;
-  int sh_degree = 1;
-  int sh_interval = 0;
+  int sh_degree = 3;
+  int sh_interval = 100;
   double near_m = 0.01;
   int reseed_interval = 25;
   double reseed_color_error = 0.03;
