@@ -7,13 +7,11 @@
 #include <set>
 
 #include "base/check.h"
+#include "map/map_spacing.h"
 #include "math/median.h"
 
 namespace photoslam {
 namespace {
-
-/// Distance between the worlds of maps that are not connected: nothing of one is ever seen in another.
-constexpr double kMapSpacing = 1e4;
 
 /// How far apart two views are: 1 at half the median depth of translation, or at 45° between the viewing directions.
 double view_distance(const SE3& a_from_world, const SE3& b_from_world, double median_depth) {
@@ -77,9 +75,9 @@ Tracker::Tracker(const TrackerOptions& options, const OrbOptions& orb, const Pin
       initializer_(options.initialization, camera),
       keyframe_decision_(options.keyframes) {}
 
-void Tracker::resume(int num_keyframes, int num_maps) {
+void Tracker::resume(int num_keyframes, int next_place) {
   num_proposed_ = num_keyframes;
-  num_maps_ = num_maps;
+  next_place_ = next_place;
   reference_ = KeyframeId(num_keyframes - 1);
   lost_frames_ = 1;
 }
@@ -135,7 +133,7 @@ TrackingResult Tracker::track(const std::shared_ptr<const FeatureFrame>& frame, 
 TrackingResult Tracker::start_map(const std::shared_ptr<const FeatureFrame>& frame) {
   TrackingResult result;
   result.num_features = static_cast<int>(frame->size());
-  const SE3 first_from_world(Quat::Identity(), Vec3(-kMapSpacing * num_maps_, 0, 0));
+  const SE3 first_from_world(Quat::Identity(), Vec3(-kMapSpacing * next_place_, 0, 0));
   FrameMatches matches(frame->size());
   if (bf_ > 0) {
     result.num_inliers = static_cast<int>(std::ranges::count_if(frame->depth, [](float d) { return d > 0; }));
@@ -169,7 +167,7 @@ TrackingResult Tracker::start_map(const std::shared_ptr<const FeatureFrame>& fra
     result.keyframe->initial = std::move(initial);
     initializer_.restart();
   }
-  ++num_maps_;
+  ++next_place_;
   result.state = TrackingState::tracking;
   result.has_pose = true;
   result.reference = reference_;

@@ -59,8 +59,8 @@ class Tracker {
   /// bf = fx * baseline [px m]; 0 for a single camera, whose unit of length is then arbitrary.
   Tracker(const TrackerOptions& options, const OrbOptions& orb, const PinholeCamera& camera, double bf);
 
-  /// Begins lost in a map of so many keyframes, in so many separate parts, that was made before.
-  void resume(int num_keyframes, int num_maps);
+  /// Begins lost in a map of so many keyframes that was made before, with this next_free_place().
+  void resume(int num_keyframes, int next_place);
 
   /// `may_become_keyframe` is false for frames that are tracked only (held out, or localisation without mapping).
   TrackingResult track(const std::shared_ptr<const FeatureFrame>& frame, std::shared_ptr<const MapSnapshot> map,
@@ -105,7 +105,7 @@ class Tracker {
   KeyframeId reference_;  // the newest proposal, even before the map knows it
   PendingKeyframes pending_;
   int num_proposed_ = 0;
-  int num_maps_ = 0;
+  int next_place_ = 0;  // of the next map [kMapSpacing]
   std::map<LandmarkId, Sighting> sightings_;
 };
 

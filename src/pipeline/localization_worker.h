@@ -31,8 +31,8 @@ class LocalizationWorker {
   /// What mapping needs to know of the rectified camera.
   MapperSensor sensor() const;
 
-  /// Begins lost in a map of so many keyframes, in so many separate parts.
-  void resume(int num_keyframes, int num_maps) { tracker_.resume(num_keyframes, num_maps); }
+  /// Begins lost in a map of so many keyframes, with this next_free_place().
+  void resume(int num_keyframes, int next_place) { tracker_.resume(num_keyframes, next_place); }
 
   /// `keyframes_allowed` is false while mapping cannot take another one.
   FrameOutcome process(FedFrame fed, std::shared_ptr<const MapSnapshot> map, bool keyframes_allowed,

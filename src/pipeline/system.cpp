@@ -11,6 +11,7 @@
 #include "base/check.h"
 #include "base/clock.h"
 #include "map/connected_components.h"
+#include "map/map_spacing.h"
 #include "pipeline/config.h"
 #include "pipeline/localization_worker.h"
 #include "pipeline/mapping_worker.h"
@@ -140,9 +141,7 @@ std::shared_ptr<const MapSnapshot> Session::load_session() {
   reader(geometry_, mapping_.mapper());
   auto map = geometry_.snapshot();
   loop_closer_.resume(*map);
-  const auto num_maps =
-      std::ranges::count_if(map->keyframes, [](const auto& view) { return !view->keyframe.parent.valid(); });
-  localization_.resume(static_cast<int>(map->keyframes.size()), static_cast<int>(num_maps));
+  localization_.resume(static_cast<int>(map->keyframes.size()), next_free_place(*map));
   mapping_.gaussians = mapping_.mapper().gaussians().size();
   return map;
 }
