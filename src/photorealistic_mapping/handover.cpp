@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "map/map_spacing.h"
 #include "photorealistic_mapping/world_export.h"
 
 namespace photoslam {
@@ -44,7 +45,8 @@ void LastViewers::show(int keyframe, const PinholeCamera& camera, std::span<cons
     const Vec3 p =
         Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(pose.rotation) * mean_of(model_.get(i)) +
         Eigen::Map<const Vec3>(pose.translation);
-    if (!(p.z() > 0)) return;
+    constexpr double kElsewhere = kMapSpacing / 2;  // beyond is another map, whatever the picture shows of it
+    if (!(p.z() > 0 && p.z() < kElsewhere)) return;
     const Vec2 pixel = camera.project(p);
     const bool inside =
         pixel.x() > -0.5 && pixel.y() > -0.5 && pixel.x() < camera.width - 0.5 && pixel.y() < camera.height - 0.5;

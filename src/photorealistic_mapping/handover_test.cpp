@@ -4,8 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "map/map_spacing.h"
 #include "photorealistic_mapping/view_geometry.h"
 
 namespace photoslam {
@@ -88,6 +90,23 @@ TEST_F(Handover, WhatIsHiddenOrOutOfSightStaysWhereItIs) {
       EXPECT_EQ(model.tag(i), kFront);
     }
   });
+}
+
+TEST_F(Handover, WhatLiesInAnotherMapIsNotShown) {
+  model = {};
+  model.add_anchor();
+  splatting::Gaussian far;
+  far.mean[2] = static_cast<float>(kMapSpacing);
+  for (float& log_scale : far.log_scale) log_scale = static_cast<float>(std::log(0.5 * kMapSpacing));
+  far.rotation[0] = 1;
+  far.opacity_logit = 4;
+  model.add(0, {&far, 1});
+  const auto camera_from_anchor = poses(0, {Sim3{}});
+  const auto picture = render(camera_from_anchor);
+  EXPECT_GT(*std::ranges::max_element(picture.alpha), 0.9f) << "nothing else is there to hide it";
+  LastViewers viewers(model);
+  viewers.show(0, kCamera, camera_from_anchor, picture);
+  EXPECT_EQ(viewers[0], LastViewers::kNobody);
 }
 
 TEST_F(Handover, NothingChangesHandsWithoutACorrection) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "map/map_spacing.h"
 #include "pipeline/session_file.h"
 #include "pipeline/system.h"
 #include "pipeline/testing/corner_source.h"
@@ -39,6 +40,25 @@ class SessionMergeTest : public ::testing::Test {
     EXPECT_EQ(walk(start_at, num_frames, sensor).failure, "");
     return *read_session(folder);
   }
+  /// Two walks that nobody has joined, in one session.
+  std::string session_in_two_parts(int first_start, int second_start, int num_frames) {
+    LoadedParts one(session(first_start, num_frames)), two(session(second_start, num_frames));
+    one.geometry.append(two.geometry);
+    one.mapper.append(std::move(two.mapper));
+    Archive both;
+    both(one.header, one.geometry, one.mapper);
+    return both.bytes();
+  }
+  struct LoadedParts {
+    explicit LoadedParts(const std::string& bytes) {
+      Archive reader(bytes);
+      reader(header, geometry, mapper);
+    }
+    const SourceInfo info = CornerSource(1).info();
+    SessionHeader header;
+    GeometryMapper geometry{{}, {}, info.camera, 0.2 * info.camera.fx};
+    PhotorealisticMapper mapper{{}, {info.camera, info.metres_per_depth_unit}, 1};
+  };
 
   std::filesystem::path folder = std::filesystem::temp_directory_path() / fmt::format("photoslam-merge-{}", ::getpid());
   ThreadPool executor{2};
@@ -74,6 +94,72 @@ TEST_F(SessionMergeTest, MapsThatShowDifferentPlacesStayApart) {
   const auto merged = merge_sessions({}, session(0, 20), session(300, 20), executor);
   ASSERT_FALSE(merged);
   EXPECT_NE(merged.error().message.find("no place"), std::string::npos);
+}
+
+/// Where the gaussians of each keyframe are in its frame.
+std::vector<std::vector<Vec3>> means_of_keyframes(const FrozenMap& map) {
+  std::vector<std::vector<Vec3>> means(map.anchors_from_world.size());
+  map.gaussians.for_each([&](size_t i) {
+    const auto& mean = map.gaussians.get(i).mean;
+    means[static_cast<size_t>(map.gaussians.anchor(i))].emplace_back(mean[0], mean[1], mean[2]);
+  });
+  return means;
+}
+
+TEST_F(SessionMergeTest, GaussiansStayWithTheKeyframesThatShowThem) {
+  const RunOutcome one = walk(0, 60, SensorKind::rgbd);
+  const std::string first = *read_session(folder);
+  const RunOutcome two = walk(40, 60, SensorKind::rgbd);
+  const std::string second = *read_session(folder);
+  SystemOptions as_they_are;  // what was trained in either is only moved
+  as_they_are.photorealistic_mapping.schedule.seam_uses = 0;
+  as_they_are.photorealistic_mapping.doubling.enabled = false;
+  const auto merged = merge_sessions(as_they_are, first, second, executor);
+  ASSERT_TRUE(merged) << merged.error().message;
+
+  auto expected = means_of_keyframes(one.final);
+  for (auto& means : means_of_keyframes(two.final)) expected.push_back(std::move(means));
+  const auto found = means_of_keyframes(merged->map);
+  ASSERT_EQ(found.size(), expected.size());
+  for (size_t k = 0; k < found.size(); ++k) EXPECT_TRUE(found[k] == expected[k]) << "keyframe " << k;
+}
+
+TEST_F(SessionMergeTest, PartsOfTheSecondThatMeetEachOtherOnlyAreNoMerge) {
+  const std::string elsewhere = session(0, 20);
+  const auto merged = merge_sessions({}, elsewhere, session_in_two_parts(300, 320, 60), executor);
+  ASSERT_FALSE(merged);
+  EXPECT_NE(merged.error().message.find("no place"), std::string::npos);
+}
+
+TEST_F(SessionMergeTest, AMapBegunLaterLiesBesideAllParts) {
+  LoadedParts one(session(0, 20)), two(session(0, 20));
+  // The part between them has been joined with the first.
+  MapCorrection aside;
+  aside.new_world_from_old_world.assign(two.geometry.map().num_keyframes(),
+                                        Sim3(SE3(Quat::Identity(), Vec3(2 * kMapSpacing, 0, 0))));
+  two.mapper.update_poses(*two.geometry.correct(aside));
+  one.geometry.append(two.geometry);
+  one.mapper.append(std::move(two.mapper));
+  Archive both;
+  both(one.header, one.geometry, one.mapper);
+
+  RunSettings settings;
+  settings.deterministic = true;
+  settings.threads = 2;
+  settings.loaded_session = std::make_shared<const std::string>(both.bytes());
+  SystemOptions impatient;
+  impatient.localization.recently_lost_s = 0.1;
+  impatient.pipeline.iterations_per_frame = 0;
+  CornerSource elsewhere(12);
+  elsewhere.start_at = 300;
+  const RunOutcome outcome = run_slam(impatient, settings, elsewhere);
+  EXPECT_EQ(outcome.failure, "");
+  const auto& poses = outcome.final.keyframes_from_world;
+  const size_t num_old = one.geometry.map().num_keyframes();
+  ASSERT_GT(poses.size(), num_old);
+  for (size_t k = 0; k < num_old; ++k) {
+    EXPECT_GT((poses.back().inverse().translation - poses[k].inverse().translation).norm(), 0.9 * kMapSpacing) << k;
+  }
 }
 
 TEST_F(SessionMergeTest, SessionsOfOtherSensorsAreRefused) {
