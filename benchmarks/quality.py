@@ -26,7 +26,7 @@ SWITCHES = {
     "no dense seeding": ["seeding.dense=false", "reseed_interval=0"],
     "no seeds at inactive features": ["seeding.inactive_features=false"],
     "no seeding again": ["reseed_interval=0"],
-    "exposure": ["exposure.enabled=true"],
+    "no exposure": ["exposure.enabled=false"],
     "depth loss": ["depth_weight=0.1"],
     "opacity regularisation": ["opacity_weight=0.01"],
     "no refinement of poses": ["poses.enabled=false"],
@@ -58,7 +58,11 @@ def run(arguments, sequence: pathlib.Path, switch: str, iterations: int, seed: i
         subprocess.run(command, capture_output=True, check=True)
         for bulky in ("map.ply", "report.html"):
             (output / bulky).unlink(missing_ok=True)
-    return json.loads(report.read_text())
+    figures = json.loads(report.read_text())
+    if SWITCHES[switch] and not any(PREFIX + setting.split("=")[0] in figures["config"]["changed"]
+                                    for setting in SWITCHES[switch]):
+        raise SystemExit(f"the switch '{switch}' sets what is the default: {', '.join(SWITCHES[switch])}")
+    return figures
 
 
 def mean(reports: list[dict], group: str, key: str) -> float:

@@ -27,9 +27,9 @@ COMMANDS = ["run", "eval", "render", "export", "train", "synth", "doctor", "conf
 FAST = ["--pace", "asap", "--set", "pipeline.iterations_per_frame=1"]
 
 
-def photoslam(*arguments, timeout=300):
+def photoslam(*arguments, timeout=300, cwd=None):
     return subprocess.run(
-        [BINARY, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, check=False
+        [BINARY, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, check=False, cwd=cwd
     )
 
 
@@ -123,6 +123,19 @@ class UsageTest(CommandLineTest):
         self.assertEqual(result.returncode, 0)
         for word in ("cores usable", "SIMD", "Eigen", "cuda", "LPIPS", "write"):
             self.assertIn(word, result.stdout)
+        rows = dict(re.findall(r"^(\w+) +(.*)$", result.stdout, re.MULTILINE))
+        for word in ("mono", "stereo", "RGB-D", "tum", "euroc", "kitti", "replica", "images", "video"):
+            self.assertIn(word, rows["input"])
+        # What it says of videos is what happens to one.
+        video = self.folder / "video.mp4"
+        video.write_bytes(b"not really")
+        attempt = photoslam("run", video, "--fov", "60", "--output", self.output)
+        self.assertEqual(rows["video"] == "ready", "photoslam_video.so" not in attempt.stderr, rows["video"])
+        devices = [str(path) for path in Path("/dev").glob("video*")]
+        for device in devices:
+            self.assertIn(device, rows["cameras"])
+        if not devices:
+            self.assertEqual(rows["cameras"], "none found (/dev/video*)")
 
 
 class BackendTest(CommandLineTest):
@@ -194,6 +207,14 @@ class BadInputTest(CommandLineTest):
         result = photoslam("run", empty, "--output", self.output)
         self.assert_fails(result, 1, empty)
         self.assert_nothing_written()
+
+    def test_format_that_does_not_fit(self):
+        self.assert_fails(photoslam("run", SEQUENCE, "--format", "video", "--output", self.output), 1, "is a folder")
+        self.assert_fails(photoslam("run", "camera:0", "--format", "video", "--fov", "60"), 1, "is a live camera")
+        video = self.folder / "video.mp4"
+        video.write_bytes(b"not really")
+        self.assert_fails(photoslam("run", video, "--format", "video", "--output", self.output), 1, "video")
+        self.assert_fails(photoslam("run", video, "--format", "tum", "--output", self.output), 1, "is a file")
 
     def test_folder_of_text_files(self):
         notes = self.folder / "notes"
@@ -361,6 +382,38 @@ class RunTest(CommandLineTest):
         (output / "run.json").write_text(json.dumps(description), encoding="utf-8")
         self.assert_fails(photoslam("eval", output, "--poses", "truth"), 1, "--truth")
 
+    def test_poses_of_a_squinting_rig_are_those_of_the_rectified_camera(self):
+        rig = self.folder / "rig"
+        self.assertEqual(photoslam("synth", "room", "--sensor", "stereo", "--lens", "radial", "--frames", "14", "--shrink",
+                                   "2", "--noise", "0", "--output", rig).returncode, 0)
+        output = self.run_deterministic("run", "--iterations-per-frame", "8", sequence=rig)
+        report = json.loads((output / "report.json").read_text(encoding="utf-8"))
+        self.assertLess(report["ate"]["rot_rmse_deg"], 0.2)
+        result = photoslam("eval", output, "--poses", "truth", "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertAlmostEqual(json.loads(result.stdout)["ate"]["rot_rmse_deg"], report["ate"]["rot_rmse_deg"], places=5)
+        self.assertAlmostEqual(json.loads(result.stdout)["image"]["psnr_db"], report["image"]["psnr_db"], delta=0.5)
+
+    def test_a_run_on_a_live_camera_is_not_read_again(self):
+        output = self.run_deterministic("run")
+        description = json.loads((output / "run.json").read_text(encoding="utf-8"))
+        for device in ("camera:0", "/dev/video0"):
+            description["dataset"] = device
+            (output / "run.json").write_text(json.dumps(description), encoding="utf-8")
+            for command in (["eval", output], ["export", output, "--to", "colmap", "--output", self.output],
+                            ["export", output, "--to", "transforms", "--output", self.output],
+                            ["train", "--poses", output, "--output", self.output]):
+                self.assert_fails(photoslam(*command), 1, f"live camera {device}", "record a video")
+
+    def test_relative_paths_mean_the_same_from_any_folder(self):
+        sequence = self.copy_of_sequence()
+        shutil.move(sequence / "camera.yaml", self.folder / "mine.yaml")
+        result = photoslam("run", sequence.name, "--camera", "mine.yaml", "--output", "out", "--deterministic",
+                           cwd=self.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        result = photoslam("eval", self.output, cwd="/")
+        self.assertEqual(result.returncode, 0, result.stderr)
+
     def train(self, *arguments):
         """Gaussians of the map that `train` writes, and the PSNR of the views it was trained on."""
         trained = self.folder / "trained"
@@ -378,6 +431,13 @@ class RunTest(CommandLineTest):
         grown, trained = self.train("--poses", run, "--init", "random:500", "--iterations", "400")
         self.assertGreater(grown, begin)
         self.assertGreater(trained, blind + 6)
+
+    def test_a_number_of_random_gaussians_is_a_whole_number(self):
+        run = self.run_deterministic("run", "--iterations-per-frame", "1")
+        for count in ("10k", "1e4", "", "0", "-3", "99999999999", "10 "):
+            result = photoslam("train", "--poses", run, "--init", f"random:{count}", "--output", self.output)
+            self.assert_fails(result, 1, f"--init random:{count}: expected random:COUNT")
+            self.assert_nothing_written()
 
     def test_training_from_the_map_of_the_run_improves_it(self):
         run = self.run_deterministic("run", "--iterations-per-frame", "2")

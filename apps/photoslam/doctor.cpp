@@ -1,6 +1,7 @@
 // Copyright the photoslam authors.
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <hwy/highway.h>
 #include <sys/sysinfo.h>
 #include <unistd.h>
@@ -15,6 +16,7 @@
 #include "base/file.h"
 #include "base/version.h"
 #include "commands.h"
+#include "sources/open_source.h"
 #include "splatting/gpu.h"
 
 namespace photoslam {
@@ -72,7 +74,11 @@ Status report_machine() {
                                      EIGEN_MINOR_VERSION, HWY_MAJOR, HWY_MINOR, HWY_PATCH));
   const auto gpu = splatting::describe_gpu();
   print_row("splatting", "cpu: ready; cuda: " + (gpu ? *gpu : gpu.error().message));
-  print_row("input", "TUM RGB-D, Replica RGB-D; mono, stereo, video and live cameras: not part of this build");
+  print_row("input", fmt::format("mono, stereo and RGB-D; formats {}", fmt::join(source_formats(), ", ")));
+  const Status video = check_video_support();
+  print_row("video", video.ok() ? "ready" : "not readable: " + video.error().message);
+  const std::vector<std::string> cameras = describe_cameras();
+  print_row("cameras", cameras.empty() ? "none found (/dev/video*)" : fmt::format("{}", fmt::join(cameras, "; ")));
   print_row("LPIPS", "not part of this build: image.lpips is null in reports");
   print_row("write", write_access());
   return {};

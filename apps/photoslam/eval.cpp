@@ -12,6 +12,7 @@
 #include "evaluation/map_scoring.h"
 #include "evaluation/run_evaluation.h"
 #include "evaluation/seen_surfaces.h"
+#include "evaluation/true_trajectory.h"
 #include "result_table.h"
 #include "run_folder.h"
 #include "sources/ground_truth.h"
@@ -141,22 +142,22 @@ std::string as_csv(const std::vector<FrameScore>& scores) {
   return csv;
 }
 
-Result<FinishedRun> read_run(const EvalArguments& arguments) {
+Result<FinishedRun> read_run(const EvalArguments& arguments, const RunDescription& description,
+                             const SourceInfo& source) {
   FinishedRun run;
+  run.description = description;
   const auto take = [](auto read, auto& target) -> Status {
     if (!read) return read.error();
     target = std::move(*read);
     return {};
   };
   const fs::path& folder = arguments.folder;
-  if (Status s = take(read_run_description(folder), run.description); !s) return s.error();
   if (Status s = take(read_tum_trajectory(folder / "trajectory.tum"), run.estimate); !s) return s.error();
   if (Status s = take(read_tum_trajectory(folder / "trajectory_online.tum"), run.online); !s) return s.error();
   if (Status s = take(read_frame_log(folder / "frames.csv"), run.log); !s) return s.error();
-  const auto truth =
-      arguments.truth.empty() ? find_ground_truth(run.description.dataset) : std::optional(arguments.truth);
+  const auto truth = arguments.truth.empty() ? find_ground_truth(description.dataset) : std::optional(arguments.truth);
   if (!truth) return run;
-  if (Status s = take(read_ground_truth(*truth), run.truth); !s) return s.error();
+  if (Status s = take(read_true_trajectory(*truth, source), run.truth); !s) return s.error();
   if (!absolute_error(run.estimate, *run.truth, false)) {
     return error("{}: fewer than three poses within 20 ms of those of {}", truth->string(),
                  (folder / "trajectory.tum").string());
@@ -169,16 +170,16 @@ Status eval(const EvalArguments& arguments) {
   auto report = read_report(arguments.folder / "report.json");
   if (!report) return report.error();
   html.report = std::move(*report);
-  const auto run = read_run(arguments);
-  if (!run) return run.error();
-
-  SourceOptions options = run->description.source;
-  auto source = open_source(run->description.dataset, options);
+  auto description = read_run_description(arguments.folder);
+  if (!description) return description.error();
+  auto source = open_run_source(arguments.folder, *description);
   if (!source) return source.error();
+  const auto run = read_run(arguments, *description, (*source)->info());
+  if (!run) return run.error();
   const bool with_scale = (*source)->info().sensor == SensorKind::mono;
   if (arguments.seen_until > 0) {  // depth that the run did not use tells what was seen
-    options.sensor.reset();
-    source = open_source(run->description.dataset, options);
+    description->source.sensor.reset();
+    source = open_run_source(arguments.folder, *description);
     if (!source) return source.error();
   }
   if (run->truth) evaluate_trajectories(run->estimate, run->online, *run->truth, with_scale, html);
@@ -205,7 +206,7 @@ void add_eval(CommandLine& line) {
                                "  photoslam eval output/desk\n"
                                "  photoslam eval output/desk --truth groundtruth.txt --frames keyframes\n");
   command.add_option("run", arguments->folder, "Output folder of a run")->required();
-  command.add_option("--truth", arguments->truth, "True trajectory: a file or a sequence folder");
+  command.add_option("--truth", arguments->truth, "True trajectory of the left camera: a file or a sequence folder");
   command.add_option("--frames", arguments->frames, "Frames whose images are scored")
       ->check(CLI::IsMember({"all", "keyframes", "held-out"}))
       ->capture_default_str();

@@ -30,14 +30,17 @@ struct MergeArguments {
 Status write_merged(const fs::path& folder, const MergedSessions& merged) {
   if (Status status = prepare_output_folder(folder); !status) return status;
   if (Status status = write_session(folder / "session.photoslam", merged.session); !status) return status;
+  // Files show one world, that of the first session's beginning; the session keeps what hangs together with nothing.
   Trajectory keyframes;
+  std::vector<uint8_t> connected;
   for (size_t i = 0; i < merged.keyframe_times_ns.size(); ++i) {
-    if (merged.component_of_keyframe[i] != 0) continue;
+    connected.push_back(merged.component_of_keyframe[i] == 0 ? 1 : 0);
+    if (connected.back() == 0) continue;
     keyframes.push_back({merged.keyframe_times_ns[i], merged.map.keyframes_from_world[i].inverse()});
   }
   if (Status status = write_tum_trajectory(folder / "keyframes.tum", keyframes); !status) return status;
   const auto written =
-      write_gaussian_ply(folder / "map.ply", to_world(merged.map.gaussians, merged.map.anchors_from_world));
+      write_gaussian_ply(folder / "map.ply", to_world(merged.map.gaussians, merged.map.anchors_from_world, connected));
   return written ? Status{} : written.error();
 }
 

@@ -13,6 +13,7 @@
 #include "config_arguments.h"
 #include "evaluation/report_html.h"
 #include "evaluation/run_evaluation.h"
+#include "evaluation/true_trajectory.h"
 #include "interrupt.h"
 #include "pipeline/frame_rectifier.h"
 #include "pipeline/session_file.h"
@@ -121,7 +122,7 @@ Status save_and_evaluate(const RunArguments& arguments, const SystemOptions& opt
   if (!source) return source.error();
   std::optional<Trajectory> truth;
   if (const auto path = find_ground_truth(arguments.dataset)) {
-    auto read = read_ground_truth(*path);
+    auto read = read_true_trajectory(*path, info);
     if (read) {
       truth = std::move(*read);
     } else {

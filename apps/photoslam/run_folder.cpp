@@ -13,15 +13,22 @@ namespace photoslam {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+/// A path that means the same from any folder; nothing stays nothing.
+fs::path anywhere(const fs::path& path) { return path.empty() ? path : fs::absolute(path); }
+
+}  // namespace
+
 Status write_run_description(const fs::path& folder, const RunDescription& description) {
   const PinholeCamera& c = description.camera;
   const nlohmann::ordered_json json = {
-      {"dataset", fs::absolute(description.dataset).string()},
+      {"dataset", (is_camera(description.dataset) ? description.dataset : anywhere(description.dataset)).string()},
       {"format", description.source.format},
       {"sensor", description.source.sensor ? sensor_name(*description.source.sensor) : "auto"},
       {"fov_deg", description.source.fov_deg},
       {"frames_per_second", description.source.frames_per_second},
-      {"camera_file", description.source.camera.string()},
+      {"camera_file", anywhere(description.source.camera).string()},
       {"camera", {{"width", c.width}, {"height", c.height}, {"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}}},
       {"hold_out", description.hold_out}};
   return write_file_atomically(folder / "run.json", json.dump(2) + "\n");
@@ -52,6 +59,16 @@ Result<RunDescription> read_run_description(const fs::path& folder) {
   }
 }
 
+Result<std::unique_ptr<FrameSource>> open_run_source(const fs::path& folder, const RunDescription& description) {
+  if (is_camera(description.dataset)) {
+    return error(
+        "{}: the images of this run came from the live camera {} and were not kept, but they are needed here; record a "
+        "video, then run and measure that",
+        folder.string(), description.dataset.string());
+  }
+  return open_source(description.dataset, description.source);
+}
+
 Result<ExposureTrack> read_run_exposures(const fs::path& folder) {
   if (!fs::exists(folder / kExposuresFile)) return ExposureTrack{};
   return read_exposures(folder / kExposuresFile);
@@ -67,7 +84,8 @@ Status write_run_results(const fs::path& folder, const RunOutcome& run, size_t& 
   if (Status status = write_exposures(folder / kExposuresFile, keyframe_exposures(run, run.final)); !status)
     return status;
   const fs::path map = folder / "map.ply";
-  const auto written = write_gaussian_ply(map, to_world(run.final.gaussians, run.final.anchors_from_world));
+  const GaussianTable connected = to_world(run.final.gaussians, run.final.anchors_from_world, connected_keyframes(run));
+  const auto written = write_gaussian_ply(map, connected);
   if (!written) return written.error();
   std::error_code ignored;
   map_bytes = fs::file_size(map, ignored);

@@ -35,7 +35,7 @@ Status for_each_keyframe_image(const std::filesystem::path& run, const std::func
   if (!description) return description.error();
   const auto keyframes = read_tum_trajectory(run / "keyframes.tum");
   if (!keyframes) return keyframes.error();
-  auto source = open_source(description->dataset, description->source);
+  auto source = open_run_source(run, *description);
   if (!source) return source.error();
   std::map<int64_t, SE3> pose_at;
   for (const StampedPose& pose : *keyframes) pose_at[pose.timestamp_ns] = pose.world_from_camera.inverse();

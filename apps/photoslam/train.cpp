@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <charconv>
 #include <memory>
 #include <thread>
 
@@ -157,13 +158,20 @@ std::vector<splatting::Gaussian> random_gaussians(const PosedImages& input, int 
   return gaussians;
 }
 
+constexpr int kMostRandom = 20'000'000;
+
 /// The gaussians to begin with; nothing when they are seeded from measured depth.
 Result<std::vector<splatting::Gaussian>> initial_gaussians(const TrainArguments& arguments, const PosedImages& input) {
   std::vector<splatting::Gaussian> gaussians;
   if (arguments.init == "depth") return gaussians;
   if (arguments.init.starts_with("random:")) {
-    const int count = std::atoi(arguments.init.c_str() + 7);
-    if (count < 1) return error("--init {}: expected random:COUNT", arguments.init);
+    const char* const end = arguments.init.data() + arguments.init.size();
+    int count = 0;
+    const auto read = std::from_chars(arguments.init.data() + 7, end, count);
+    if (read.ec != std::errc{} || read.ptr != end || count < 1 || count > kMostRandom) {
+      return error("--init {}: expected random:COUNT, a whole number from 1 to {}, as in random:10000", arguments.init,
+                   kMostRandom);
+    }
     return random_gaussians(input, count, arguments.seed);
   }
   const auto table = read_gaussian_ply(arguments.init);

@@ -119,7 +119,8 @@ SlamResult map_source(FrameSource& source, const SlamSettings& settings, const K
   result.keyframes = to_poses(keyframe_trajectory(run));
   const PinholeCamera camera = FrameRectifier(info).camera();
   result.camera = {camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, {}};
-  result.map = SplatMapAccess::make(to_world(run.final.gaussians, run.final.anchors_from_world));
+  result.map =
+      SplatMapAccess::make(to_world(run.final.gaussians, run.final.anchors_from_world, connected_keyframes(run)));
   if (run_settings.gpu) {
     result.gpu = run_settings.gpu->name();
     result.gpu_failure = run_settings.gpu->failure();

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "base/check.h"
 #include "splatting/formulas.h"
 
 namespace photoslam {
@@ -85,7 +86,11 @@ Gaussian transform(const Gaussian& in_a, const SE3& b_from_a, const ShRotation& 
   return in_b;
 }
 
-GaussianTable to_world(const splatting::GaussianModel& model, std::span<const SE3> anchors_from_world) {
+GaussianTable to_world(const splatting::GaussianModel& model, std::span<const SE3> anchors_from_world,
+                       std::span<const uint8_t> chosen) {
+  PHOTOSLAM_CHECK(chosen.empty() || chosen.size() == anchors_from_world.size(), "{} choices for {} anchors",
+                  chosen.size(), anchors_from_world.size());
+  const auto is_chosen = [&](size_t anchor) { return chosen.empty() || chosen[anchor] != 0; };
   std::vector<SE3> world_from_anchors;
   std::vector<ShRotation> rotations;
   for (const SE3& anchor_from_world : anchors_from_world) {
@@ -94,12 +99,16 @@ GaussianTable to_world(const splatting::GaussianModel& model, std::span<const SE
   }
   const int used = splatting::num_sh_coefficients(model.sh_degree());
   GaussianTable table;
-  table.resize(model.size());
-  size_t row = 0;
+  size_t num_rows = 0, row = 0;
+  for (size_t anchor = 0; anchor < anchors_from_world.size(); ++anchor) {
+    if (is_chosen(anchor)) num_rows += model.size(static_cast<int>(anchor));
+  }
+  table.resize(num_rows);
   model.for_each([&](size_t index) {
+    const auto anchor = static_cast<size_t>(model.anchor(index));
+    if (!is_chosen(anchor)) return;
     Gaussian g = model.get(index);
     std::fill(&g.sh[0][0] + 3 * used, &g.sh[0][0] + 48, 0.0f);
-    const auto anchor = static_cast<size_t>(model.anchor(index));
     write_row(transform(g, world_from_anchors[anchor], rotations[anchor]), table.row(row++));
   });
   return table;

@@ -114,6 +114,24 @@ TEST_F(WorldExportTest, MovingMapAndCamerasTogetherChangesNothing) {
   EXPECT_LT(largest_difference(in_old, in_new), 1e-4f) << "also once exported";
 }
 
+TEST_F(WorldExportTest, AnchorsOfAnotherWorldAreLeftOut) {
+  splatting::GaussianModel model, of_one;
+  const std::vector<SE3> anchors = {random_pose(random), random_pose(random), random_pose(random)};
+  for (int a = 0; a < 3; ++a) {
+    const auto cloud = random_cloud(random, 70 + a);  // more than a block holds
+    model.add(model.add_anchor(), cloud);
+    if (a == 1) of_one.add(of_one.add_anchor(), cloud);
+  }
+  const std::vector<uint8_t> chosen = {0, 1, 0};
+  const GaussianTable part = to_world(model, anchors, chosen),
+                      alone = to_world(of_one, std::span(anchors).subspan(1, 1));
+  ASSERT_EQ(part.size(), 71u);
+  for (size_t i = 0; i < part.size(); ++i) {
+    EXPECT_TRUE(std::ranges::equal(part.row(i), alone.row(i))) << i;
+  }
+  EXPECT_EQ(to_world(model, anchors, std::vector<uint8_t>{1, 1, 1}).size(), model.size());
+}
+
 TEST_F(WorldExportTest, CoefficientsBeyondTheDegreeInUseAreZero) {
   splatting::GaussianModel model;
   model.set_sh_degree(1);

@@ -6,6 +6,22 @@
 #include <map>
 
 namespace photoslam {
+namespace {
+
+int component_of(const FrameOutcome& frame, const RunOutcome& run) {
+  const auto reference = static_cast<size_t>(frame.reference.value);
+  return frame.reference.valid() && reference < run.component_of_keyframe.size() ? run.component_of_keyframe[reference]
+                                                                                 : 0;
+}
+
+/// That of most tracked frames.
+int largest_component(const RunOutcome& run) {
+  std::map<int, int> sizes = {{0, 0}};
+  for (const FrameOutcome& frame : run.frames) sizes[component_of(frame, run)] += frame.has_pose ? 1 : 0;
+  return std::ranges::max_element(sizes, {}, [](const auto& entry) { return entry.second; })->first;
+}
+
+}  // namespace
 
 std::optional<SE3> camera_from_world(const FrameOutcome& frame, const FrozenMap& map) {
   if (!frame.has_pose || static_cast<size_t>(frame.reference.value) >= map.keyframes_from_world.size()) {
@@ -18,20 +34,21 @@ std::optional<SE3> camera_from_world(const FrameOutcome& frame, const FrozenMap&
 }
 
 std::vector<FrameOutcome> connected_frames(const RunOutcome& run) {
-  const auto component = [&run](const FrameOutcome& frame) {
-    const auto reference = static_cast<size_t>(frame.reference.value);
-    return frame.reference.valid() && reference < run.component_of_keyframe.size()
-               ? run.component_of_keyframe[reference]
-               : 0;
-  };
-  std::map<int, int> sizes;
-  for (const FrameOutcome& frame : run.frames) sizes[component(frame)] += frame.has_pose ? 1 : 0;
-  const auto largest = std::ranges::max_element(sizes, {}, [](const auto& entry) { return entry.second; });
+  const int largest = largest_component(run);
   std::vector<FrameOutcome> frames;
   for (const FrameOutcome& frame : run.frames) {
-    if (frame.has_pose && component(frame) == largest->first) frames.push_back(frame);
+    if (frame.has_pose && component_of(frame, run) == largest) frames.push_back(frame);
   }
   return frames;
+}
+
+std::vector<uint8_t> connected_keyframes(const RunOutcome& run) {
+  const int largest = largest_component(run);
+  std::vector<uint8_t> connected(run.final.keyframes_from_world.size(), 1);
+  for (size_t i = 0; i < std::min(connected.size(), run.component_of_keyframe.size()); ++i) {
+    connected[i] = run.component_of_keyframe[i] == largest ? 1 : 0;
+  }
+  return connected;
 }
 
 Trajectory final_trajectory(const RunOutcome& run) {

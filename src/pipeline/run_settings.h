@@ -93,6 +93,9 @@ std::optional<SE3> camera_from_world(const FrameOutcome& frame, const FrozenMap&
 /// side of it have poses that mean nothing to those on the other.
 std::vector<FrameOutcome> connected_frames(const RunOutcome& run);
 
+/// [K] 1 for the keyframes in that world, 0 for the others. Without any tracked frame it is that of the first keyframe.
+std::vector<uint8_t> connected_keyframes(const RunOutcome& run);
+
 /// Poses of all connected frames in the final map, as published online, and of the keyframes.
 Trajectory final_trajectory(const RunOutcome& run);
 Trajectory online_trajectory(const RunOutcome& run);

@@ -27,10 +27,12 @@ TEST(ConnectedFrames, TrajectoriesLeaveOutMapsThatAreNotConnectedWithTheLargest)
     return result;
   };
   EXPECT_EQ(times(final_trajectory(run)), (std::vector<int64_t>{0, 2, 3, 4, 5})) << "one map, one lost frame";
+  EXPECT_EQ(connected_keyframes(run), (std::vector<uint8_t>{1, 1, 1}));
   run.component_of_keyframe = {0, 1, 1};
   EXPECT_EQ(times(final_trajectory(run)), (std::vector<int64_t>{2, 3, 4}));
   EXPECT_EQ(times(online_trajectory(run)), (std::vector<int64_t>{2, 3, 4}));
   EXPECT_EQ(times(keyframe_trajectory(run)), (std::vector<int64_t>{2, 3, 4}));
+  EXPECT_EQ(connected_keyframes(run), (std::vector<uint8_t>{0, 1, 1}));
   EXPECT_TRUE(final_trajectory({}).empty());
 }
 

@@ -86,7 +86,7 @@ class Session {
   void deliver(MapUpdate update);
   void receive_due_updates();
   void refine(const std::function<void(const Progress&)>& on_progress);
-  Progress progress(Progress::Phase phase) const;
+  Progress progress(Progress::Phase phase);
 
   SystemOptions options_;
   RunSettings settings_;
@@ -122,6 +122,10 @@ class Session {
   std::deque<int> update_due_;  // logical frame numbers
   int frame_number_ = 0;
   int next_frame_id_ = 0;
+
+  // Whoever reports progress only.
+  std::vector<Vec3> shown_positions_;
+  size_t num_shown_ = 0;
 
   RunOutcome outcome_;
 
@@ -231,8 +235,9 @@ void Session::look_for_loops() {
 void Session::close_remaining_loops() {
   if (logical_time_) return;
   take_correction();
-  while (newest_map_) {
-    const auto correction = loop_closer_.process(*newest_map_);
+  const auto stopped = [this] { return stop_.stop_requested(); };
+  while (newest_map_ && !stopped()) {
+    const auto correction = loop_closer_.process(*newest_map_, stopped);
     if (!correction) return;
     deliver({geometry_.correct(*correction), KeyframeId{}, nullptr, nullptr});
   }
@@ -335,24 +340,29 @@ void Session::record(FrameOutcome outcome) {
   outcomes_.push_back(std::move(outcome));
 }
 
-Progress Session::progress(Progress::Phase phase) const {
-  std::lock_guard lock(mutex_);
+/// The tracker takes the same mutex for every frame: under it only what is new since the last call is read.
+Progress Session::progress(Progress::Phase phase) {
   Progress p;
+  {
+    std::lock_guard lock(mutex_);
+    p.frames = static_cast<int>(outcomes_.size());
+    if (!outcomes_.empty()) p.state = outcomes_.back().state;
+    p.dropped = num_dropped_;
+    p.keyframes = newest_map_ ? static_cast<int>(newest_map_->keyframes.size()) : 0;
+    for (; settings_.preview && num_shown_ < outcomes_.size(); ++num_shown_) {
+      const FrameOutcome& frame = outcomes_[num_shown_];
+      if (frame.has_pose) shown_positions_.push_back(frame.online_camera_from_world.inverse().translation);
+    }
+  }
   p.phase = phase;
-  p.frames = static_cast<int>(outcomes_.size());
   p.num_frames = num_frames_;
   p.frames_per_second = p.frames / std::max(clock_.seconds(), 1e-3);
-  if (!outcomes_.empty()) p.state = outcomes_.back().state;
-  p.dropped = num_dropped_;
-  p.keyframes = newest_map_ ? static_cast<int>(newest_map_->keyframes.size()) : 0;
   p.gaussians = mapping_.gaussians;
   p.iterations = mapping_.iterations;
   p.training_psnr_db = mapping_.training_psnr;
   if (settings_.preview) {
     p.comparison = mapping_.comparison();
-    for (const FrameOutcome& frame : outcomes_) {
-      if (frame.has_pose) p.positions.push_back(frame.online_camera_from_world.inverse().translation);
-    }
+    p.positions = shown_positions_;
   }
   return p;
 }

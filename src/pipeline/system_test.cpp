@@ -181,6 +181,30 @@ TEST(RunSlam, AStopFromOutsideKeepsWhatWasMade) {
   EXPECT_GT(outcome.final.gaussians.size(), 0u);
 }
 
+TEST(RunSlam, ThePreviewShowsThePathSoFar) {
+  for (const int threads : {1, 2}) {
+    RunSettings settings = deterministic(threads);
+    settings.preview = true;
+    CornerSource source(20);
+    source.defect_at = 6;
+    std::vector<Vec3> last;
+    int reports = 0;
+    const RunOutcome outcome = run_slam({}, settings, source, {}, [&](const Progress& progress) {
+      ASSERT_GE(progress.positions.size(), last.size());
+      EXPECT_TRUE(std::equal(last.begin(), last.end(), progress.positions.begin())) << "what was shown stays";
+      last = progress.positions;
+      ++reports;
+    });
+    std::vector<Vec3> path;
+    for (const FrameOutcome& frame : outcome.frames) {
+      if (frame.has_pose) path.push_back(frame.online_camera_from_world.inverse().translation);
+    }
+    EXPECT_EQ(path.size(), 19u);
+    EXPECT_EQ(last, path) << "once each, in order";
+    if (threads == 1) EXPECT_GE(reports, 20) << "after every frame";
+  }
+}
+
 TEST(RunSlam, RefinementRunsTheIterationsAskedFor) {
   RunSettings settings = deterministic(2);
   settings.refine_iterations = 25;

@@ -18,6 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kVideo = "video";  // a file; the other formats are folders
+
 struct Format {
   std::string name;
   bool (*matches)(const fs::path& folder);
@@ -58,15 +60,38 @@ Status check_folder(const fs::path& path) {
 std::vector<std::string> source_formats() {
   std::vector<std::string> names;
   for (const Format& format : formats()) names.push_back(format.name);
+  names.emplace_back(kVideo);
   return names;
+}
+
+Status check_video_support() { return internal::check_decoder(); }
+
+std::vector<std::string> describe_cameras() {
+  std::vector<std::string> findings;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator("/dev", ignored)) {
+    const std::string device = entry.path().string();
+    if (!is_camera(device)) continue;
+    const auto name = internal::V4l2Device::identify(device, internal::system_device_calls());
+    findings.push_back(name ? fmt::format("{} ({})", device, *name) : name.error().message);
+  }
+  std::ranges::sort(findings, internal::natural_less);
+  return findings;
 }
 
 bool is_camera(const fs::path& path) { return internal::camera_device(path.string()).has_value(); }
 
 Result<std::unique_ptr<FrameSource>> open_source(const fs::path& path, const SourceOptions& options) {
-  if (const auto device = internal::camera_device(path.string())) return internal::open_webcam(*device, options);
+  if (const auto device = internal::camera_device(path.string())) {
+    if (options.format == "auto") return internal::open_webcam(*device, options);
+    return error("{} is a live camera and has no format: leave out --format {}", path.string(), options.format);
+  }
   std::error_code ignored;
-  if (fs::is_regular_file(path, ignored) && options.format == "auto") return internal::open_video(path, options);
+  const bool as_video = options.format == kVideo;
+  if (fs::is_regular_file(path, ignored) && (as_video || options.format == "auto")) {
+    return internal::open_video(path, options);
+  }
+  if (fs::is_directory(path, ignored) && as_video) return error("{} is a folder; a video is a file", path.string());
   if (const Status status = check_folder(path); !status) return status.error();
   for (const Format& format : formats()) {
     if (options.format == format.name) return format.open(path, options);

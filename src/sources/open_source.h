@@ -21,8 +21,14 @@ struct SourceOptions {
   std::optional<SensorKind> sensor = {};  ///< Guessed from the data where not given.
 };
 
-/// Names of the layouts that can be read.
+/// Names of the layouts that can be read; all but "video" are folders.
 std::vector<std::string> source_formats();
+
+/// The error says why video files cannot be read here.
+Status check_video_support();
+
+/// Every video device of this machine: its name, or why it takes no pictures for us.
+std::vector<std::string> describe_cameras();
 
 /// Whether the path names a camera, whose frames cannot be read twice.
 bool is_camera(const std::filesystem::path& path);

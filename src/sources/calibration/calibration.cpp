@@ -46,6 +46,7 @@ Result<CameraFile> read_calibration(const std::filesystem::path& path) {
   if (!map) return map.error();
   if (internal::is_orb_slam_settings(*map)) return internal::read_orb_slam_settings(*map);
   if (internal::is_opencv_calibration(*map)) return internal::read_opencv_calibration(*map);
+  if (internal::is_opencv_stereo(*map)) return internal::read_opencv_stereo(*map);
   if (map->has("intrinsics")) {
     Result<EurocSensor> sensor = read_euroc_sensor(path);
     if (!sensor) return sensor.error();

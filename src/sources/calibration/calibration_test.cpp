@@ -48,6 +48,41 @@ TEST_F(CalibrationTest, ReadsOpenCvFileStorage) {
   EXPECT_THAT(failure("camera_matrix: [500, 0, 320]\n"), HasSubstr("expected 9 numbers of 'camera_matrix', found 3"));
 }
 
+TEST_F(CalibrationTest, FourCoefficientsNeedAModel) {
+  const std::string four = "camera_matrix: [50, 0, 32, 0, 51, 24, 0, 0, 1]\ndistortion_coefficients: [1, 2, 3, 4]\n";
+  EXPECT_THAT(failure(four), HasSubstr("file.yaml:2: distortion_coefficients: four numbers may be k1 k2 p1 p2 or"));
+  const Distortion fisheye{.k1 = 1, .k2 = 2, .k3 = 3, .k4 = 4, .model = LensModel::kannala_brandt};
+  EXPECT_EQ(read(four + "distortion_model: plumb_bob\n").distortion, (Distortion{1, 2, 3, 4}));
+  EXPECT_EQ(read(four + "distortion_model: equidistant\n").distortion, fisheye);
+  EXPECT_EQ(read(four + "fisheye_model: 1\n").distortion, fisheye) << "as OpenCV's calibration sample writes it";
+  EXPECT_EQ(read(four + "fisheye_model: 0\n").distortion, (Distortion{1, 2, 3, 4}));
+  EXPECT_THAT(failure(four + "distortion_model: fov\n"), HasSubstr("file.yaml:3: unknown distortion_model 'fov'"));
+  EXPECT_TRUE(read("camera_matrix: [50, 0, 32, 0, 51, 24, 0, 0, 1]\ndistortion_coefficients: [0, 0, 0, 0]\n")
+                  .distortion.none());
+}
+
+TEST_F(CalibrationTest, ReadsOpenCvStereo) {
+  const auto matrix = [](const char* name, int rows, int cols, const char* data) {
+    return fmt::format("{}: !!opencv-matrix\n   rows: {}\n   cols: {}\n   dt: d\n   data: [ {} ]\n", name, rows, cols,
+                       data);
+  };
+  const std::string intrinsics = "%YAML:1.0\n---\n" + matrix("M1", 3, 3, "50., 0., 32., 0., 51., 24., 0., 0., 1.") +
+                                 matrix("D1", 1, 5, "-0.3, 0.1, 0., 0., 0.02") +
+                                 matrix("M2", 3, 3, "52., 0., 33., 0., 53., 25., 0., 0., 1.") +
+                                 matrix("D2", 1, 5, "-0.2, 0.1, 0., 0., 0.");
+  // The right camera is turned by 90° about z: x_right = R x_left + T.
+  const std::string rotation = matrix("R", 3, 3, "0., 1., 0., -1., 0., 0., 0., 0., 1.");
+  const CameraFile file = read(intrinsics + rotation + matrix("T", 3, 1, "-0.12, 0.01, 0.") + "image_width: 64\n");
+  EXPECT_EQ(file.camera, (PinholeCamera{64, 0, 50, 51, 32, 24}));
+  EXPECT_EQ(file.distortion, (Distortion{-0.3, 0.1, 0, 0, 0.02}));
+  ASSERT_TRUE(file.right.has_value());
+  EXPECT_EQ(file.right->camera, (PinholeCamera{64, 0, 52, 53, 33, 25}));
+  EXPECT_EQ(file.right->distortion, (Distortion{-0.2, 0.1}));
+  EXPECT_LT((file.right->right_from_left * Vec3(1, 2, 3) - Vec3(2 - 0.12, -1 + 0.01, 3)).norm(), 1e-12);
+  EXPECT_THAT(failure(intrinsics), HasSubstr("the pair's R and T are missing"));
+  EXPECT_THAT(failure(intrinsics + rotation + matrix("T", 3, 1, "-120., 1., 0.")), HasSubstr("T must be in metres"));
+}
+
 TEST_F(CalibrationTest, ReadsRosCameraInfo) {
   const CameraFile file = read(
       "image_width: 64\nimage_height: 48\ncamera_name: left\ncamera_matrix:\n  rows: 3\n  cols: 3\n"

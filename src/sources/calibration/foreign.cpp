@@ -33,6 +33,38 @@ PinholeCamera from_matrix(YamlMap& map, const std::string& key) {
   return {0, 0, k[0], k[4], k[2], k[5]};
 }
 
+/// The kind of lens that a file of OpenCV or ROS states; nothing where it does not.
+std::optional<LensModel> stated_lens(YamlMap& map) {
+  if (const auto fisheye = map.optional_text("fisheye_model")) {  // of OpenCV's calibration sample
+    return *fisheye == "0" || *fisheye == "false" ? LensModel::radial_tangential : LensModel::kannala_brandt;
+  }
+  const auto model = map.optional_text("distortion_model");
+  if (!model) return std::nullopt;
+  for (const char* name : {"plumb_bob", "rational_polynomial", "radtan", "radial-tangential"}) {
+    if (*model == name) return LensModel::radial_tangential;
+  }
+  for (const char* name : {"equidistant", "fisheye", "kannala_brandt"}) {
+    if (*model == name) return LensModel::kannala_brandt;
+  }
+  map.fail(
+      "distortion_model",
+      fmt::format("unknown distortion_model '{}'; there are plumb_bob, rational_polynomial and equidistant", *model));
+  return std::nullopt;
+}
+
+/// Coefficients as OpenCV's calibrateCamera or its fisheye module give them. Four numbers may be of either.
+Distortion opencv_lens(YamlMap& map, const std::string& key) {
+  const std::optional<LensModel> stated = stated_lens(map);
+  const std::vector<double> coefficients = map.numbers(key);
+  const bool some = std::ranges::any_of(coefficients, [](double c) { return c != 0; });
+  if (!stated && coefficients.size() == 4 && some) {
+    map.fail(key, fmt::format("{}: four numbers may be k1 k2 p1 p2 or the k1 k2 k3 k4 of cv::fisheye; add the line "
+                              "'distortion_model: plumb_bob' or 'distortion_model: equidistant'",
+                              key));
+  }
+  return lens(map, key, stated.value_or(LensModel::radial_tangential), coefficients);
+}
+
 /// The image size under the first of the names that is there; 0 where there is none: then the images tell.
 int side(YamlMap& map, std::initializer_list<const char*> names) {
   for (const char* name : names) {
@@ -120,11 +152,38 @@ Result<CameraFile> read_opencv_calibration(YamlMap& map) {
   file.camera = from_matrix(map, "camera_matrix");
   file.camera.width = side(map, {"image_width"});
   file.camera.height = side(map, {"image_height"});
-  const std::string model = map.optional_text("distortion_model").value_or("plumb_bob");
-  const bool fisheye = model == "equidistant" || model == "fisheye";
-  const std::string key = map.has("distortion_coefficients") ? "distortion_coefficients" : "dist_coeffs";
-  file.distortion =
-      lens(map, key, fisheye ? LensModel::kannala_brandt : LensModel::radial_tangential, map.numbers(key));
+  file.distortion = opencv_lens(map, map.has("distortion_coefficients") ? "distortion_coefficients" : "dist_coeffs");
+  if (const Status status = map.status(); !status) return status.error();
+  return file;
+}
+
+bool is_opencv_stereo(const YamlMap& map) { return map.has("M1") && map.has("M2"); }
+
+Result<CameraFile> read_opencv_stereo(YamlMap& map) {
+  constexpr double kLongestBaseline = 10;  // m
+  CameraFile file;
+  RightCamera right;
+  file.camera = from_matrix(map, "M1");
+  right.camera = from_matrix(map, "M2");
+  file.camera.width = right.camera.width = side(map, {"image_width"});
+  file.camera.height = right.camera.height = side(map, {"image_height"});
+  file.distortion = opencv_lens(map, "D1");
+  right.distortion = opencv_lens(map, "D2");
+  if (!map.has("R") || !map.has("T")) {
+    map.fail(
+        "M2",
+        "the pair's R and T are missing; OpenCV's sample writes them to extrinsics.yml: append its lines from R on");
+  }
+  const std::vector<double> t = list_of(map, "T", 3);
+  const double baseline = Vec3(t[0], t[1], t[2]).norm();
+  if (!(baseline > 0 && baseline < kLongestBaseline)) {
+    map.fail("T",
+             fmt::format("T: the cameras are {:g} m apart; T must be in metres, and OpenCV has it in the unit that "
+                         "the squares of the calibration board were given in",
+                         baseline));
+  }
+  right.right_from_left = SE3(Quat::Identity(), Vec3(t[0], t[1], t[2])) * rotation_of(map, "R");
+  file.right = right;
   if (const Status status = map.status(); !status) return status.error();
   return file;
 }

@@ -116,6 +116,11 @@ ImageU8 turned(const ImageU8& image, int clockwise_deg) {
   return out;
 }
 
+Status check_decoder() {
+  const auto decoder = load_decoder();
+  return decoder ? Status{} : decoder.error();
+}
+
 Result<std::unique_ptr<FrameSource>> open_video(const fs::path& file, const SourceOptions& options) {
   SourceInfo info;
   info.format = "video";

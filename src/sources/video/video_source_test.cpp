@@ -38,6 +38,22 @@ class VideoTest : public TempFolderTest {
   }
 };
 
+TEST_F(VideoTest, TheFormatMayBeNamed) {
+  const auto path = write_video(2);
+  const auto guessed = open_source(path, {.fov_deg = 60}),
+             named = open_source(path, {.format = "video", .fov_deg = 60});
+  EXPECT_EQ(check_video_support().ok(), guessed.ok());
+  ASSERT_EQ(named.ok(), guessed.ok());
+  if (named) {
+    EXPECT_EQ((*named)->info().format, "video");
+  } else {
+    EXPECT_EQ(named.error().message, guessed.error().message);
+  }
+  EXPECT_THAT(open_source(path, {.format = "images"}).error().message, HasSubstr("is a file; a dataset is a folder"));
+  EXPECT_THAT(open_source(folder, {.format = "video"}).error().message, HasSubstr("is a folder; a video is a file"));
+  EXPECT_THAT(open_source("camera:7", {.format = "video"}).error().message, HasSubstr("camera:7 is a live camera"));
+}
+
 TEST_F(VideoTest, ReadsFramesAndTimes) {
   const auto opened = open_source(write_video(6), {.fov_deg = 60});
   if (!opened && opened.error().message.find("photoslam_video.so") != std::string::npos) {

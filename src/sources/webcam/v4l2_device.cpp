@@ -59,8 +59,7 @@ Error V4l2Device::failure(const std::string& what) const {
   return error("{}: {}: {}", path_, what, std::strerror(errno));
 }
 
-Result<std::unique_ptr<V4l2Device>> V4l2Device::open(const std::string& path, int width, int height, double fps,
-                                                     std::unique_ptr<DeviceCalls> calls) {
+Result<std::unique_ptr<V4l2Device>> V4l2Device::connect(const std::string& path, std::unique_ptr<DeviceCalls> calls) {
   std::unique_ptr<V4l2Device> device(new V4l2Device(path, std::move(calls)));
   device->file_ = device->calls_->open(path.c_str());
   if (device->file_ < 0) {
@@ -71,8 +70,21 @@ Result<std::unique_ptr<V4l2Device>> V4l2Device::open(const std::string& path, in
     return error("cannot open the camera {}: {}{}", path, std::strerror(errno), hint);
   }
   if (Status status = device->check_capabilities(); !status) return status.error();
-  if (Status status = device->choose_format(width, height, fps); !status) return status.error();
-  if (Status status = device->start(); !status) return status.error();
+  return device;
+}
+
+Result<std::string> V4l2Device::identify(const std::string& path, std::unique_ptr<DeviceCalls> calls) {
+  const auto device = connect(path, std::move(calls));
+  if (!device) return device.error();
+  return (*device)->name();
+}
+
+Result<std::unique_ptr<V4l2Device>> V4l2Device::open(const std::string& path, int width, int height, double fps,
+                                                     std::unique_ptr<DeviceCalls> calls) {
+  auto device = connect(path, std::move(calls));
+  if (!device) return device.error();
+  if (Status status = (*device)->choose_format(width, height, fps); !status) return status.error();
+  if (Status status = (*device)->start(); !status) return status.error();
   return device;
 }
 

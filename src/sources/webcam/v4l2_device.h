@@ -41,6 +41,8 @@ class V4l2Device {
   /// Errors say what the device is not, or who has it.
   static Result<std::unique_ptr<V4l2Device>> open(const std::string& path, int width, int height, double fps,
                                                   std::unique_ptr<DeviceCalls> calls);
+  /// The name of the camera, which is opened and left as it is; the error says what the device is not.
+  static Result<std::string> identify(const std::string& path, std::unique_ptr<DeviceCalls> calls);
   ~V4l2Device();
   V4l2Device(const V4l2Device&) = delete;
   V4l2Device& operator=(const V4l2Device&) = delete;
@@ -60,6 +62,7 @@ class V4l2Device {
   };
 
   V4l2Device(std::string path, std::unique_ptr<DeviceCalls> calls) : path_(std::move(path)), calls_(std::move(calls)) {}
+  static Result<std::unique_ptr<V4l2Device>> connect(const std::string& path, std::unique_ptr<DeviceCalls> calls);
   int control(unsigned long request, void* argument) const;
   Error failure(const std::string& what) const;
   Status check_capabilities();

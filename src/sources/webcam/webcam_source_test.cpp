@@ -118,6 +118,18 @@ class FakeCamera final : public internal::DeviceCalls {
   std::vector<std::vector<uint8_t>> memory_;
 };
 
+TEST(Webcam, TellsWhatADeviceIs) {
+  using internal::V4l2Device;
+  EXPECT_EQ(V4l2Device::identify("/dev/video9", std::make_unique<FakeCamera>(std::vector<uint32_t>{})).value(), "Fake");
+  auto metadata = std::make_unique<FakeCamera>(std::vector<uint32_t>{});
+  metadata->capabilities = V4L2_CAP_STREAMING;
+  EXPECT_THAT(V4l2Device::identify("/dev/video9", std::move(metadata)).error().message, HasSubstr("takes no pictures"));
+  auto busy = std::make_unique<FakeCamera>(std::vector<uint32_t>{});
+  busy->open_error = EBUSY;
+  EXPECT_THAT(V4l2Device::identify("/dev/video9", std::move(busy)).error().message,
+              HasSubstr("another program has it"));
+}
+
 TEST(Webcam, CountsDroppedFramesAndTellsOfDamage) {
   // Four frames at most, so that the queue loses none however slow this thread is.
   const auto source = internal::open_webcam("/dev/video9", {.fov_deg = 60},
