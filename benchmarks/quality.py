@@ -35,9 +35,11 @@ SWITCHES = {
     "pyramid 1": ["schedule.pyramid_levels=1"],
     "pyramid 3": ["schedule.pyramid_levels=3", "schedule.start_pixels=1"],
     "full size online": ["schedule.online_pixels=1000000000"],
+    "never full size online": ["schedule.online_uses=0"],
     "SSIM online": ["ssim_weight_online=0.2"],
     "SH degree 0": ["sh_degree=0"],
-    "SH degree 3": ["sh_degree=3"],
+    "SH degree 1": ["sh_degree=1"],
+    "SH degree 3 at once": ["sh_interval=0"],
     "cap of 5000": ["densification.max_gaussians=5000"],
     "cap of 5000, relocation": ["densification.max_gaussians=5000", "densification.relocation=true"],
 }

@@ -40,6 +40,10 @@ ProgressLine::~ProgressLine() {
 }
 
 void ProgressLine::show(const Progress& progress) {
+  for (const std::string& message : progress.messages) {
+    fmt::print(stderr, "{}  note: {}\n", open_ ? "\n" : "", message);
+    open_ = false;
+  }
   if (!first_ && since_last_.seconds() < (terminal_ ? kRewriteInterval_s : kLineInterval_s)) return;
   since_last_.restart();
   first_ = false;

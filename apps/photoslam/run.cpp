@@ -167,6 +167,7 @@ Status run(const RunArguments& arguments) {
     });
     if (!preview.failure().empty()) fmt::print(stderr, "  note: no preview: {}\n", preview.failure());
   }
+  for (const std::string& message : outcome.messages) fmt::print(stderr, "  note: {}\n", message);
   report_failure(gpu->get());
   if (outcome.final.keyframes_from_world.empty()) {
     const std::string why = outcome.frames.empty() ? "no frame was read" : outcome.frames.back().reason;

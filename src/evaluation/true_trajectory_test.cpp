@@ -2,11 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluation/true_trajectory.h"
 
-#include "evaluation/run_evaluation.h"
 #include "io/temp_folder_test.h"
 #include "pipeline/frame_rectifier.h"
-#include "pipeline/system.h"
-#include "pipeline/testing/corner_source.h"
 #include "sources/open_source.h"
 #include "sources/synthetic/room.h"
 #include "sources/synthetic/sensor_model.h"
@@ -63,30 +60,6 @@ TEST_F(TrueTrajectoryTest, IsWhereTheRectifiedPicturesOfATurnedRigWereTaken) {
   mono.sensor = SensorKind::mono;
   EXPECT_EQ(of_tracked_camera(left, mono)[1].world_from_camera.matrix(), left[1].world_from_camera.matrix())
       << "a single camera is tracked as it is mounted";
-}
-
-TEST(TrueTrajectory, AnExactlyTrackedRigHasNoErrorOfRotation) {
-  constexpr int kFrames = 45;  // more than the second over which motions are compared
-  testing::CornerSource source(kFrames, 320, 240, SensorKind::stereo);
-  RunSettings settings;
-  settings.deterministic = true;
-  const RunOutcome run = run_slam({}, settings, source);
-  Trajectory left;
-  for (const FrameOutcome& frame : run.frames) {
-    left.push_back({frame.timestamp_ns, testing::CornerSource::camera_from_world(frame.frame.value).inverse()});
-  }
-  const auto evaluated = [&](const Trajectory& truth) {
-    SerialExecutor serial;
-    return evaluate_run(run, {}, source, truth, false, serial).report;
-  };
-  const Report report = evaluated(of_tracked_camera(left, source.info()));
-  EXPECT_EQ(report.frames.tracked, kFrames);
-  EXPECT_LT(*report.ate.rot_rmse_deg, 0.2);
-  EXPECT_LT(*report.rpe.rot_deg, 0.1);
-  // The figure means something: the axes of the camera as it is mounted lie this far from those of the tracked one.
-  const double turn = so3_log(FrameRectifier(source.info()).rectified_from_left()).norm() * 180 / std::numbers::pi;
-  EXPECT_GT(turn, 0.7);
-  EXPECT_NEAR(*evaluated(left).ate.rot_rmse_deg, turn, 0.2);
 }
 
 }  // namespace

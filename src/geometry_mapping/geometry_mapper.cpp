@@ -109,7 +109,9 @@ void GeometryMapper::insert(const KeyframeProposal& proposal) {
     if (id.valid() && map_.add_observation(id, proposal.id, static_cast<int>(i))) map_.update_view(id);
   }
   for (const auto& [keypoint, seen] : proposal.same_as) {
-    const LandmarkId id = map_.keyframe(seen.keyframe).landmarks[static_cast<size_t>(seen.keypoint)];
+    const std::vector<LandmarkId>& landmarks = map_.keyframe(seen.keyframe).landmarks;
+    if (static_cast<size_t>(seen.keypoint) >= landmarks.size()) continue;  // culled meanwhile
+    const LandmarkId id = landmarks[static_cast<size_t>(seen.keypoint)];
     if (id.valid() && map_.add_observation(id, proposal.id, keypoint)) map_.update_view(id);
   }
 }

@@ -227,7 +227,8 @@ void Tracker::resolve_last_matches() {
     TrackedPoint& point = last_matches_.point[i];
     if (last_matches_.matched[i] && map_ && map_->has(point.same_as.keyframe)) {
       const Keyframe& keyframe = map_->keyframe(point.same_as.keyframe).keyframe;
-      point.landmark = keyframe.landmarks[static_cast<size_t>(point.same_as.keypoint)];
+      const auto keypoint = static_cast<size_t>(point.same_as.keypoint);  // a culled keyframe has none
+      point.landmark = keypoint < keyframe.landmarks.size() ? keyframe.landmarks[keypoint] : LandmarkId();
       point.same_as = {};
     }
     if (const LandmarkView* view = map_ ? map_->find(point.landmark) : nullptr) {

@@ -89,7 +89,6 @@ int KeyframeSchedule::take(std::vector<int>& views) {
 }
 
 int KeyframeSchedule::draw() {
-  if (is_revisiting()) return take(revisits_);
   if (round_.empty()) round_ = active_;
   return take(round_);
 }
@@ -103,7 +102,9 @@ int KeyframeSchedule::draw_worse() {
 KeyframeSchedule::Choice KeyframeSchedule::next(bool refining) {
   PHOTOSLAM_CHECK(!active_.empty());
   Choice choice;
-  if (!refining && random_.uniform() < options_.newest_probability) {
+  if (is_revisiting()) {
+    choice.view = take(revisits_);
+  } else if (!refining && random_.uniform() < options_.newest_probability) {
     choice.view = active_.back();
   } else {
     const bool worse = options_.worse_probability > 0 && random_.uniform() < options_.worse_probability;

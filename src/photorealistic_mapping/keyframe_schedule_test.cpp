@@ -84,6 +84,19 @@ TEST(KeyframeSchedule, TheNewestViewGetsItsShare) {
   EXPECT_NEAR(static_cast<double>(newest) / kDraws, expected, 0.015);  // 4.6 standard deviations
 }
 
+TEST(KeyframeSchedule, SeamsComeBeforeTheNewest) {
+  ScheduleOptions options;
+  options.newest_probability = 1;
+  options.seam_uses = 2;
+  KeyframeSchedule schedule(options, 640, 480, 5);
+  for (int i = 0; i < 4; ++i) schedule.add_view();
+  schedule.revisit(std::vector{1});
+  EXPECT_EQ(schedule.next(false).view, 1);
+  EXPECT_EQ(schedule.next(false).view, 1);
+  EXPECT_FALSE(schedule.is_revisiting());
+  EXPECT_EQ(schedule.next(false).view, 3);
+}
+
 TEST(KeyframeSchedule, ARetiredViewDoesNotComeAgain) {
   KeyframeSchedule schedule({}, 640, 480, 6);
   for (int i = 0; i < 5; ++i) schedule.add_view();

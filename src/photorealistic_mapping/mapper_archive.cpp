@@ -56,7 +56,7 @@ void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
 void PhotorealisticMapper::serialize(Archive& a) {
   uint64_t num_views = views_.size();
   a(random_, schedule_, model_, anchors_from_world_, anchor_scales_, scene_depth_, iteration_, training_psnr_,
-    num_views);
+    num_corrections_, num_views);
   if (a.reading()) views_.clear();
   for (uint64_t i = 0; i < num_views; ++i) serialize_view(a, a.reading() ? nullptr : &views_[i]);
 }

@@ -144,7 +144,9 @@ TEST(MapperOnGpu, DoesWhatItDoesOnTheCpu) {
   PhotorealisticOptions options = test_options();
   options.reseed_interval = 7;
   options.densification.interval = 5;
-  options.densification.gradient_threshold = 1e-9;  // all that is seen doubles: none is at the threshold
+  // All that is seen doubles, and only what is hardly seen goes: none is at the thresholds.
+  options.densification.gradient_threshold = 1e-9;
+  options.densification.min_weight = 1e-3;
   options.depth_weight = 0.1;
   options.opacity_weight = 0.01;
   options.schedule.start_pixels = 48 * 36;

@@ -66,6 +66,7 @@ void FrameFeed::read_all() {
       if (!taken) break;
     }
   } catch (const std::exception& e) {
+    std::lock_guard lock(mutex_);
     failure_ = e.what();
   }
   early_.close();
@@ -90,7 +91,10 @@ void FrameFeed::release_all() {
 }
 
 void FrameFeed::finish() {
-  if (!failure_.empty()) failures_.report("input", failure_);
+  {
+    std::lock_guard lock(mutex_);
+    if (!failure_.empty()) failures_.report("input", failure_);
+  }
   queue_.close();
 }
 

@@ -8,9 +8,10 @@
 namespace photoslam {
 
 MappingWorker::MappingWorker(const SystemOptions& options, const RunSettings& settings, MapperSensor sensor,
-                             Executor& executor)
+                             Executor& executor, Autosave& autosave)
     : mapper_(options.photorealistic_mapping, std::move(sensor), settings.seed, settings.gpu),
       executor_(executor),
+      autosave_(autosave),
       session_file_(settings.session_file),
       preview_(settings.preview) {}
 
@@ -26,8 +27,7 @@ void MappingWorker::handle(const MappingMessage& message) {
   } else if (message.update.map) {
     mapper_.add_keyframe(*message.update.map, message.update.keyframe, *message.update.images, executor_);
   }
-  // Should this fail, the save at the end will say so.
-  if (message.update.session) (void)save(*message.update.session);
+  if (message.update.session) autosave_.ended(save(*message.update.session));
   train(message.iterations);
 }
 

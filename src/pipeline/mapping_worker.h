@@ -9,17 +9,18 @@
 #include "base/clock.h"
 #include "base/executor.h"
 #include "base/result.h"
+#include "pipeline/autosave.h"
 #include "pipeline/frame_feed.h"
 #include "pipeline/system_options.h"
 
 namespace photoslam {
 
-/// The geometric map has changed: by a keyframe that entered it or, without one, by a loop.
+/// The geometric map has changed: by a keyframe that entered it or, without one, by a loop. Or it is to be saved.
 struct MapUpdate {
   std::shared_ptr<const MapSnapshot> map;
   KeyframeId keyframe;
   std::shared_ptr<const KeyframeImages> images;
-  std::shared_ptr<Archive> session;  ///< To be completed and saved; usually none.
+  std::shared_ptr<Archive> session;  ///< Or, without a map: header and geometric map, to be completed and saved.
 };
 
 /// What photorealistic mapping is asked to do: first take over the change, if there is one, then train.
@@ -32,7 +33,8 @@ struct MappingMessage {
 /// figures that others may read at any time.
 class MappingWorker {
  public:
-  MappingWorker(const SystemOptions& options, const RunSettings& settings, MapperSensor sensor, Executor& executor);
+  MappingWorker(const SystemOptions& options, const RunSettings& settings, MapperSensor sensor, Executor& executor,
+                Autosave& autosave);
 
   void handle(const MappingMessage& message);
   /// Trains once; false when there is nothing to train on.
@@ -67,6 +69,7 @@ class MappingWorker {
 
   PhotorealisticMapper mapper_;
   Executor& executor_;
+  Autosave& autosave_;
   std::filesystem::path session_file_;
   std::atomic<SteadyTime::rep> freeze_time_{std::numeric_limits<SteadyTime::rep>::max()};
   std::optional<FrozenMap> online_;

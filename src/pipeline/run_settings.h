@@ -84,6 +84,7 @@ struct RunOutcome {
   std::vector<int> component_of_keyframe;  ///< [K] See connected_components(); empty: all are connected.
   bool interrupted = false;                ///< Stopped from outside before the input ended.
   std::string failure;                     ///< "component: what"; empty when all went well.
+  std::vector<std::string> messages;       ///< As in Progress, those that it has not told.
 };
 
 /// Pose of a frame in a frozen map; nothing for frames without a pose or whose keyframe the map does not hold.

@@ -18,7 +18,7 @@
 namespace photoslam {
 namespace {
 
-constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 6, .oldest = 6};
+constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 7, .oldest = 7};
 
 /// Lets deflate or inflate work through the input; their counts have 32 bits.
 template <class Step>

@@ -124,20 +124,6 @@ TEST_F(SessionTest, IsThereBeforeTrainingBegins) {
   }
 }
 
-TEST_F(SessionTest, AutosavesAreWholeSessions) {
-  RunSettings often = settings("often");
-  often.autosave_s = 1e-3;
-  often.deterministic = false;
-  often.pace = Pace::asap;
-  run(60, often);
-  const auto session = read_session(folder / "often");
-  ASSERT_TRUE(session) << session.error().message;
-  RunSettings localize = continuing("");
-  localize.loaded_session = std::make_shared<const std::string>(*session);
-  localize.localize_only = true;
-  EXPECT_TRUE(run(12, localize, 20).frames.back().has_pose);
-}
-
 TEST_F(SessionTest, AnotherCameraIsRefused) {
   const SessionHeader header = session_header(*bytes);
   EXPECT_TRUE(check_session_sensor(header, header.sensor.camera, header.bf));

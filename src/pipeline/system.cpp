@@ -7,11 +7,13 @@
 #include <deque>
 #include <mutex>
 #include <thread>
+#include <variant>
 
 #include "base/check.h"
 #include "base/clock.h"
 #include "map/connected_components.h"
 #include "map/map_spacing.h"
+#include "pipeline/autosave.h"
 #include "pipeline/config.h"
 #include "pipeline/localization_worker.h"
 #include "pipeline/mapping_worker.h"
@@ -32,8 +34,11 @@ int num_threads(const RunSettings& settings) {
 
 void in_background() { lower_thread_priority(ThreadPriority::background); }
 
-/// A keyframe, or nothing: then loop closure has found a correction.
-using GeometryMessage = std::optional<NewKeyframe>;
+/// Loop closure has found something.
+struct CorrectionMessage {};
+/// The session is to be saved as it is now.
+struct SaveMessage {};
+using GeometryMessage = std::variant<NewKeyframe, CorrectionMessage, SaveMessage>;
 /// The map has changed.
 struct LoopMessage {};
 
@@ -58,7 +63,8 @@ class Session {
         localization_(options, settings, source.info()),
         geometry_(options.geometry_mapping, options.features, localization_.camera(), localization_.bf()),
         loop_closer_(options.loop_closure, options.features, localization_.camera(), localization_.bf()),
-        mapping_(options, settings, localization_.sensor(), executor_),
+        autosave_(settings.session_file.empty() || settings.localize_only ? 0 : settings.autosave_s),
+        mapping_(options, settings, localization_.sensor(), executor_, autosave_),
         newest_map_(settings_.loaded_session ? load_session() : nullptr),
         visible_map_(newest_map_),
         mapping_stage_(kStageQueue, threaded_, mapping_work(), failures_),
@@ -83,10 +89,13 @@ class Session {
   std::shared_ptr<const MapSnapshot> load_session();
   std::shared_ptr<Archive> begin_session();
   void save_session();
+  void save_if_due();
+  void save_in_between();
   void deliver(MapUpdate update);
   void receive_due_updates();
   void refine(const std::function<void(const Progress&)>& on_progress);
   Progress progress(Progress::Phase phase);
+  void tell(const std::function<void(const Progress&)>& on_progress, const Progress& progress);
 
   SystemOptions options_;
   RunSettings settings_;
@@ -103,6 +112,7 @@ class Session {
   LocalizationWorker localization_;
   GeometryMapper geometry_;
   LoopCloser loop_closer_;
+  Autosave autosave_;
   MappingWorker mapping_;
 
   // Real time: the newest map. Logical time: results in order, each taken when its frame has come.
@@ -115,7 +125,6 @@ class Session {
   bool localization_done_ = false;
   std::vector<FrameOutcome> outcomes_;
   int num_dropped_ = 0;
-  double last_save_s_ = 0;  // geometry thread only
 
   // Localization thread only.
   std::shared_ptr<const MapSnapshot> visible_map_;
@@ -143,6 +152,9 @@ std::shared_ptr<const MapSnapshot> Session::load_session() {
   const Status fits = check_session_sensor(header, localization_.camera(), localization_.bf());
   PHOTOSLAM_CHECK(fits.ok(), "{}", fits.error().message);
   reader(geometry_, mapping_.mapper());
+  PHOTOSLAM_CHECK(geometry_.map().num_keyframes() == mapping_.mapper().num_keyframes(),
+                  "the session has gaussians for {} of {} keyframes: begin a new one",
+                  mapping_.mapper().num_keyframes(), geometry_.map().num_keyframes());
   auto map = geometry_.snapshot();
   loop_closer_.resume(*map);
   localization_.resume(static_cast<int>(map->keyframes.size()), next_free_place(*map));
@@ -155,24 +167,52 @@ std::shared_ptr<Archive> Session::begin_session() {
   auto session = std::make_shared<Archive>();
   SessionHeader header{localization_.sensor(), localization_.bf(), config_as_toml(options_)};
   (*session)(header, geometry_);
-  last_save_s_ = clock_.seconds();
   return session;
 }
 
-/// After all stages have ended.
+/// After all stages have ended. A session whose two maps do not fit could not be continued; an older one can.
 void Session::save_session() {
   if (settings_.session_file.empty() || settings_.localize_only || !mapping_.mapper().has_keyframes()) return;
-  if (const Status status = mapping_.save(*begin_session()); !status) {
-    failures_.report("session", status.error().message);
+  const size_t placed = geometry_.map().num_keyframes(), drawn = mapping_.mapper().num_keyframes();
+  if (placed != drawn) {
+    failures_.report("session", fmt::format("{} is left as it is: gaussians for {} of {} keyframes only",
+                                            settings_.session_file.string(), drawn, placed));
+    return;
   }
+  try {
+    if (const Status status = mapping_.save(*begin_session()); !status) {
+      failures_.report("session", status.error().message);
+    }
+  } catch (const std::exception& e) {
+    failures_.report("session", e.what());
+  }
+}
+
+/// While frames arrive: asks for it, and waits for nothing.
+void Session::save_if_due() {
+  if (autosave_.begin()) geometry_stage_.post(SaveMessage{});
+}
+
+/// On the geometry thread. Photorealistic mapping adds its part as soon as it has come as far.
+void Session::save_in_between() {
+  if (geometry_.map().num_keyframes() == 0) return autosave_.ended();
+  MapUpdate update{.map = nullptr, .keyframe = {}, .images = nullptr, .session = begin_session()};
+  if (!logical_time_) {
+    mapping_stage_.post({std::move(update)});
+    return;
+  }
+  std::lock_guard lock(mutex_);
+  updates_.push_back(std::move(update));
 }
 
 Stage<GeometryMessage>::Work Session::geometry_work() {
   const auto handle = [this](GeometryMessage message) {
-    if (message) {
-      add_keyframe(std::move(*message));
-    } else {
+    if (auto* keyframe = std::get_if<NewKeyframe>(&message)) {
+      add_keyframe(std::move(*keyframe));
+    } else if (std::holds_alternative<CorrectionMessage>(message)) {
       take_correction();
+    } else {
+      save_in_between();
     }
   };
   return {.name = "geometry mapping", .handle = handle, .on_start = [] {
@@ -200,9 +240,7 @@ void Session::add_keyframe(NewKeyframe keyframe) {
   if (const auto& initial = proposal.initial) {
     deliver({update.map, initial->id, std::move(keyframe.initial_images), nullptr});
   }
-  const bool save = settings_.autosave_s > 0 && !settings_.session_file.empty() &&
-                    clock_.seconds() - last_save_s_ >= settings_.autosave_s;
-  deliver({std::move(update.map), update.keyframe, std::move(keyframe.images), save ? begin_session() : nullptr});
+  deliver({std::move(update.map), update.keyframe, std::move(keyframe.images), nullptr});
 }
 
 /// On the geometry thread.
@@ -228,7 +266,7 @@ void Session::look_for_loops() {
     std::lock_guard lock(mutex_);
     found_correction_ = std::move(correction);
   }
-  geometry_stage_.post(std::nullopt);
+  geometry_stage_.post(CorrectionMessage{});
 }
 
 /// After both stages have ended: what loop closure found last, and what it has not looked at yet.
@@ -271,17 +309,21 @@ void Session::receive_due_updates() {
     visible_map_ = newest_map_;
     return;
   }
-  while (!update_due_.empty() && update_due_.front() <= frame_number_) {
+  while (true) {
     std::unique_lock lock(mutex_);
+    const bool is_due = !update_due_.empty() && update_due_.front() <= frame_number_;
     const auto ready = [&] { return !updates_.empty() || !failures_.text().empty(); };
-    while (!update_arrived_.wait_for(lock, kProgressInterval, ready)) {
+    while (is_due && !update_arrived_.wait_for(lock, kProgressInterval, ready)) {
     }
-    if (updates_.empty()) return;
+    const bool is_change = !updates_.empty() && updates_.front().map != nullptr;  // else a session to save
+    if (updates_.empty() || (is_change && !is_due)) return;
     MapUpdate update = std::move(updates_.front());
     updates_.pop_front();
-    update_due_.pop_front();
     lock.unlock();
-    visible_map_ = update.map;
+    if (is_change) {
+      update_due_.pop_front();
+      visible_map_ = update.map;
+    }
     mapping_stage_.post({std::move(update)});
   }
 }
@@ -307,7 +349,7 @@ void Session::localize(FedFrame fed) {
   if (keyframe) {
     const size_t num_updates = keyframe->proposal.initial ? 2 : 1;
     update_due_.insert(update_due_.end(), num_updates, frame_number_ + options_.pipeline.keyframe_lag_frames);
-    geometry_stage_.post(std::move(keyframe));
+    geometry_stage_.post(std::move(*keyframe));
   }
   if (logical_time_ && !settings_.localize_only)
     mapping_stage_.post({.update = {}, .iterations = options_.pipeline.iterations_per_frame});
@@ -355,6 +397,7 @@ Progress Session::progress(Progress::Phase phase) {
     }
   }
   p.phase = phase;
+  p.messages = autosave_.take_failures();
   p.num_frames = num_frames_;
   p.frames_per_second = p.frames / std::max(clock_.seconds(), 1e-3);
   p.gaussians = mapping_.gaussians;
@@ -367,10 +410,21 @@ Progress Session::progress(Progress::Phase phase) {
   return p;
 }
 
+/// What the listener throws ends the run as the failure of a component does, and loses nothing.
+void Session::tell(const std::function<void(const Progress&)>& on_progress, const Progress& progress) {
+  if (!on_progress) return;
+  try {
+    on_progress(progress);
+  } catch (const std::exception& e) {
+    failures_.report("progress report", e.what());
+  }
+}
+
 void Session::refine(const std::function<void(const Progress&)>& on_progress) {
   if (!mapping_.mapper().has_keyframes() || settings_.localize_only) return;
   const Stopwatch clock;
   double last_report = 0;
+  autosave_.ended();  // what was asked for while the stages ended
   for (int i = 0; !stop_.stop_requested(); ++i) {
     const double elapsed = clock.seconds();
     const double done = settings_.refine_iterations > 0 ? static_cast<double>(i) / settings_.refine_iterations
@@ -378,6 +432,7 @@ void Session::refine(const std::function<void(const Progress&)>& on_progress) {
     if (done >= 1.0 || (settings_.refine_iterations == 0 && settings_.refine_seconds <= 0)) break;
     try {
       mapping_.refine(done);
+      if (autosave_.begin()) autosave_.ended(mapping_.save(*begin_session()));
     } catch (const std::exception& e) {
       failures_.report("photorealistic mapping", e.what());
       break;
@@ -387,7 +442,7 @@ void Session::refine(const std::function<void(const Progress&)>& on_progress) {
     outcome_.refinement.push_back({elapsed, mapping_.iterations, mapping_.training_psnr, mapping_.gaussians});
     Progress p = progress(Progress::Phase::refining);
     p.refined = done;
-    if (on_progress) on_progress(p);
+    tell(on_progress, p);
   }
   outcome_.seconds_refine = clock.seconds();
 }
@@ -395,7 +450,8 @@ void Session::refine(const std::function<void(const Progress&)>& on_progress) {
 RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress) {
   if (!threaded_) {
     localize_all([&] {
-      if (on_progress) on_progress(progress(Progress::Phase::online));
+      save_if_due();
+      tell(on_progress, progress(Progress::Phase::online));
     });
   } else {
     std::thread localization([this] {
@@ -407,7 +463,8 @@ RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress)
     std::unique_lock lock(mutex_);
     while (!localization_ended_.wait_for(lock, kProgressInterval, [&] { return localization_done_; })) {
       lock.unlock();
-      if (on_progress) on_progress(progress(Progress::Phase::online));
+      save_if_due();
+      tell(on_progress, progress(Progress::Phase::online));
       lock.lock();
     }
     lock.unlock();
@@ -420,7 +477,7 @@ RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress)
     mapping_.set_freeze_time(std::chrono::steady_clock::now() +
                              std::chrono::milliseconds(static_cast<int>(1e3 * kOnlineGraceSeconds)));
   }
-  if (on_progress) on_progress(progress(Progress::Phase::draining));
+  tell(on_progress, progress(Progress::Phase::draining));
   mapping_stage_.finish();
   outcome_.online = mapping_.take_online();
   outcome_.seconds_drain = drain.seconds();
@@ -437,6 +494,7 @@ RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress)
   outcome_.seconds_total = clock_.seconds();
   outcome_.interrupted = outer_stop_.stop_requested();
   outcome_.failure = failures_.text();
+  outcome_.messages = autosave_.take_failures();
   return std::move(outcome_);
 }
 

@@ -181,6 +181,18 @@ TEST(RunSlam, AStopFromOutsideKeepsWhatWasMade) {
   EXPECT_GT(outcome.final.gaussians.size(), 0u);
 }
 
+TEST(RunSlam, AListenerThatThrowsEndsTheRunWithEverythingMadeSoFar) {
+  for (const int threads : {1, 2}) {
+    CornerSource source(20);
+    const RunOutcome outcome = run_slam({}, deterministic(threads), source, {}, [](const Progress& progress) {
+      if (progress.frames >= 10) throw std::runtime_error("the window was closed");
+    });
+    EXPECT_EQ(outcome.failure, "progress report: the window was closed");
+    EXPECT_GE(outcome.frames.size(), 10u);
+    EXPECT_GT(outcome.final.gaussians.size(), 0u);
+  }
+}
+
 TEST(RunSlam, ThePreviewShowsThePathSoFar) {
   for (const int threads : {1, 2}) {
     RunSettings settings = deterministic(threads);
@@ -201,7 +213,9 @@ TEST(RunSlam, ThePreviewShowsThePathSoFar) {
     }
     EXPECT_EQ(path.size(), 19u);
     EXPECT_EQ(last, path) << "once each, in order";
-    if (threads == 1) EXPECT_GE(reports, 20) << "after every frame";
+    if (threads == 1) {
+      EXPECT_GE(reports, 20) << "after every frame";
+    }
   }
 }
 
