@@ -24,7 +24,7 @@ struct Progress {
   size_t gaussians = 0;
   int iterations = 0;
   double training_psnr_db = 0;
-  double refined = 0;  ///< Share of the refinement done, [0, 1].
+  double refined = 0;                 ///< Share of the refinement done, [0, 1].
   std::vector<std::string> messages;  ///< What has failed since the last report without ending the run.
   // With RunSettings::preview only.
   std::shared_ptr<const KeyframeComparison> comparison;  ///< Null until there is one.
