@@ -45,6 +45,7 @@ Result<std::vector<splatting::BenchView>> load_views(const BenchArguments& argum
   if (!cameras) return cameras.error();
   std::vector<splatting::BenchView> views;
   for (const PosedCamera& posed : *cameras) {
+    if (!posed.distortion.none()) return error("{}: undistort the images first", arguments.cameras.string());
     ImageSize size{posed.camera.width, posed.camera.height};
     if (!arguments.size.empty()) {
       const auto asked = parse_image_size(arguments.size);

@@ -439,6 +439,27 @@ class RunTest(CommandLineTest):
             self.assert_fails(result, 1, f"--init random:{count}: expected random:COUNT")
             self.assert_nothing_written()
 
+    def test_training_from_the_layouts_of_others(self):
+        run = self.run_deterministic("run", "--iterations-per-frame", "1")
+        for layout in ("transforms", "colmap"):
+            exported = self.folder / layout
+            self.assertEqual(photoslam("export", run, "--to", layout, "--output", exported).returncode, 0)
+            _, begin = self.train(exported, "--iterations", "1")
+            result = photoslam("train", exported, "--iterations", "150", "--hold-out", "4", "--output", self.folder / "held")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            trained, held_out = (float(re.search(rf"{name} views\s+PSNR ([\d.]+)", result.stdout)[1])
+                                 for name in ("trained", "held-out"))
+            self.assertGreater(trained, begin + 3, layout)
+            self.assertGreater(held_out, begin, layout)
+        # The same pictures of a lens that bends: they are resampled, and less of them counts.
+        transforms = self.folder / "transforms" / "transforms.json"
+        cameras = json.loads(transforms.read_text(encoding="utf-8"))
+        cameras.update(camera_model="OPENCV", k1=0.3, k2=-0.9, p1=0, p2=0)
+        transforms.write_text(json.dumps(cameras), encoding="utf-8")
+        result = photoslam("train", self.folder / "transforms", "--iterations", "1", "--output", self.folder / "bent")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn(f"{len(cameras['frames'])} resampled", result.stderr)
+
     def test_training_from_the_map_of_the_run_improves_it(self):
         run = self.run_deterministic("run", "--iterations-per-frame", "2")
         begin, before = self.train("--poses", run, "--init", run / "map.ply", "--iterations", "1")

@@ -141,7 +141,7 @@ void add_render(CommandLine& line) {
                "  photoslam render map.ply --cameras transforms.json --format npy --output views\n");
   RenderArguments& a = *arguments;
   command.add_option("map", a.map, "map.ply, or the output folder of a run")->required();
-  command.add_option("--cameras", a.cameras, "Cameras to draw from: transforms.json");
+  command.add_option("--cameras", a.cameras, "Cameras to draw from: transforms.json; distortion is left out");
   command.add_option("--trajectory", a.trajectory, "Poses to draw from: TUM lines");
   command.add_option("--camera", a.camera, "camera.yaml for --trajectory and --orbit; default: that of the run");
   command.add_flag("--orbit", a.orbit, "Circle around the middle of the map");

@@ -40,10 +40,12 @@ Status for_each_keyframe_image(const std::filesystem::path& run, const std::func
   std::map<int64_t, SE3> pose_at;
   for (const StampedPose& pose : *keyframes) pose_at[pose.timestamp_ns] = pose.world_from_camera.inverse();
   const FrameRectifier rectifier((*source)->info());
+  std::shared_ptr<const ImageU8> mask;
+  if (!rectifier.mask().empty()) mask = std::make_shared<const ImageU8>(rectifier.mask());
   while (auto frame = (*source)->next()) {
     const auto pose = pose_at.find(frame->timestamp_ns);
     if (pose == pose_at.end() || !frame->defect.empty()) continue;
-    KeyframeImage keyframe{frame->id, frame->timestamp_ns, {rectifier.camera(), pose->second, {}}, {}};
+    KeyframeImage keyframe{frame->id, frame->timestamp_ns, {rectifier.camera(), pose->second, {}}, {}, mask};
     keyframe.image = rectifier.color(std::move(frame->color));
     if (Status status = take(std::move(keyframe)); !status) return status;
   }

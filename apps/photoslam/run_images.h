@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 
 #include "base/ids.h"
 #include "base/result.h"
@@ -19,6 +20,7 @@ struct KeyframeImage {
   int64_t timestamp_ns = 0;
   PosedCamera camera;
   ImageU8 image;
+  std::shared_ptr<const ImageU8> mask;  ///< 0 where it has no data; null: data everywhere.
 };
 
 /// Hands out the keyframes of a run in order of time; the dataset is read again for that.

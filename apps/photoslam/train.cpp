@@ -23,8 +23,7 @@
 #include "photorealistic_mapping/posed_map.h"
 #include "photorealistic_mapping/view_geometry.h"
 #include "photorealistic_mapping/world_export.h"
-#include "run_folder.h"
-#include "run_images.h"
+#include "posed_images.h"
 
 namespace photoslam {
 namespace {
@@ -44,82 +43,6 @@ struct TrainArguments {
   BackendArguments backend;
   ConfigArguments config;
 };
-
-/// Pictures with one camera and their poses, and the points that came with them.
-struct PosedImages {
-  PinholeCamera camera;
-  std::vector<SE3> poses;                                     // camera_from_world
-  std::vector<ImageU8> images;                                // RGB
-  std::vector<std::optional<splatting::Exposure>> exposures;  // as a run has learnt them
-  std::vector<int64_t> times_ns;                              // of a run's keyframes; else empty
-  std::vector<SparsePoint> points;
-
-  Status add(const PosedCamera& posed, const ImageU8& image, std::optional<splatting::Exposure> exposure = {}) {
-    if (poses.empty()) camera = posed.camera;
-    if (posed.camera != camera) {
-      return error("{}: not the camera of the first image; all must share one", posed.image.string());
-    }
-    if (image.width() != camera.width || image.height() != camera.height) {
-      return error("{}: {}x{}, but its camera says {}x{}", posed.image.string(), image.width(), image.height(),
-                   camera.width, camera.height);
-    }
-    poses.push_back(posed.camera_from_world);
-    images.push_back(to_rgb(image));
-    exposures.push_back(exposure);
-    return {};
-  }
-};
-
-/// Where a COLMAP dataset keeps its model.
-fs::path colmap_model(const fs::path& folder) {
-  for (const char* below : {"sparse/0", "sparse", "."}) {
-    if (fs::exists(folder / below / "images.txt")) return folder / below;
-  }
-  return {};
-}
-
-Result<PosedImages> read_files(const fs::path& input) {
-  PosedImages result;
-  Result<std::vector<PosedCamera>> cameras = std::vector<PosedCamera>{};
-  if (!fs::is_directory(input)) {
-    cameras = read_transforms_json(input);
-  } else if (fs::exists(input / "transforms.json")) {
-    cameras = read_transforms_json(input / "transforms.json");
-  } else if (const fs::path model = colmap_model(input); !model.empty()) {
-    cameras = read_colmap_cameras(model, input / "images");
-    auto points = read_colmap_points(model);
-    if (!points) return points.error();
-    result.points = std::move(*points);
-  } else {
-    return error("{}: found neither transforms.json nor a COLMAP model in text form (sparse/0/images.txt)",
-                 input.string());
-  }
-  if (!cameras) return cameras.error();
-  for (const PosedCamera& posed : *cameras) {
-    const auto image = read_image(posed.image);
-    if (!image) return image.error();
-    if (Status status = result.add(posed, *image); !status) return status.error();
-  }
-  return result;
-}
-
-Result<PosedImages> read_run(const fs::path& run) {
-  PosedImages result;
-  const auto exposures = read_run_exposures(run);
-  if (!exposures) return exposures.error();
-  const auto add = [&](const KeyframeImage& keyframe) {
-    std::optional<splatting::Exposure> exposure;
-    if (!exposures->empty()) exposure = nearest_exposure(*exposures, keyframe.timestamp_ns);
-    result.times_ns.push_back(keyframe.timestamp_ns);
-    return result.add(keyframe.camera, keyframe.image, exposure);
-  };
-  if (Status status = for_each_keyframe_image(run, add); !status) return status.error();
-  const auto map = read_gaussian_ply(run / "map.ply");
-  if (!map) return map.error();
-  result.points = sparse_points(*map);
-  if (result.poses.empty()) return error("{}: no keyframes whose images can still be read", run.string());
-  return result;
-}
 
 /// The part of the world that was photographed: all points but stray ones or, without points, as far around what the
 /// cameras look at as they are from it.
@@ -235,7 +158,8 @@ Status score(const TrainArguments& arguments, const PosedImages& input, const Fr
     renderer.render(map.gaussians, {to_splatting(input.camera), camera_from_anchor}, {}, executor, result);
     apply(map.keyframe_exposures[nearest], result);
     const ImageF render = to_image(result);
-    (held ? held_out : trained).push_back(score_frame(FrameId(static_cast<int32_t>(i)), 0, render, input.images[i]));
+    const FrameId id(static_cast<int32_t>(i));
+    (held ? held_out : trained).push_back(score_frame(id, 0, render, input.images[i], input.mask(i)));
     ImageU8 pair(2 * input.camera.width, input.camera.height, 3);
     const ImageU8 drawn = to_u8(render);
     for (int y = 0; y < pair.height(); ++y) {
@@ -273,7 +197,7 @@ Status train(const TrainArguments& arguments) {
   }
   Result<SystemOptions> options = arguments.config.load();
   if (!options) return options.error();
-  const auto input = arguments.run.empty() ? read_files(arguments.input) : read_run(arguments.run);
+  const auto input = arguments.run.empty() ? read_posed_images(arguments.input) : read_keyframes_of_run(arguments.run);
   if (!input) return input.error();
   const auto start = initial_gaussians(arguments, *input);
   if (!start) return start.error();
@@ -293,13 +217,18 @@ Status train(const TrainArguments& arguments) {
   const auto map = posed_map(input->camera, poses, points);
   fmt::print(stderr, "{} images {}x{}, {} of them to train on\n", input->images.size(), input->camera.width,
              input->camera.height, poses.size());
+  if (input->num_resampled > 0) {
+    fmt::print(stderr, "{} resampled to what a lens without distortion, as long as the first image's, sees\n",
+               input->num_resampled);
+  }
 
   const InterruptGuard interrupt;
   PhotorealisticMapper mapper(options->photorealistic_mapping, {.camera = input->camera}, arguments.seed, *gpu);
   int32_t keyframe = 0;
   for (size_t i = 0; i < input->images.size(); ++i) {
     if (is_held_out(arguments, i)) continue;
-    mapper.add_keyframe(*map, KeyframeId(keyframe++), {input->images[i], {}, {}}, executor, input->exposures[i]);
+    mapper.add_keyframe(*map, KeyframeId(keyframe++), {input->images[i], {}, {}, input->mask(i)}, executor,
+                        input->exposures[i]);
   }
   mapper.add_gaussians(*start);
   train_until_done(arguments, interrupt.token(), executor, mapper);
@@ -322,7 +251,7 @@ void add_train(CommandLine& line) {
                                "  photoslam train colmap_folder --hold-out 8\n"
                                "  photoslam train --poses output/desk --init random:10000 --seconds 60\n");
   TrainArguments& a = *arguments;
-  command.add_option("images", a.input, "transforms.json, or a folder with one or with a COLMAP model as text");
+  command.add_option("images", a.input, "transforms.json, or a folder with one or with a COLMAP model");
   command.add_option("--poses", a.run, "Take images and poses of the keyframes of a run instead");
   command.add_option("--output", a.output, "Folder for map.ply and the pairs")->capture_default_str();
   command

@@ -30,6 +30,8 @@ struct KeyframeImages {
   ImageU8 color;   ///< RGB.
   ImageU16 depth;  ///< Empty without a depth sensor.
   ImageU8 right;   ///< Grey, from the right camera of a rectified stereo pair; else empty.
+  /// 0 where this picture has no data, if it differs from the others of the sensor; sessions cannot keep it.
+  ImageU8 mask = {};
 };
 
 /// A selected frame of the map.

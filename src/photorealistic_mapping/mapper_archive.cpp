@@ -1,5 +1,8 @@
 // Copyright the photoslam authors.
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "base/check.h"
 #include "math/archive.h"
 #include "photorealistic_mapping/image_archive.h"
 #include "photorealistic_mapping/photorealistic_mapper.h"
@@ -39,6 +42,7 @@ void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
   ImageU8 color;
   ImageU16 depth;
   if (!a.reading() && view->has_images()) {
+    PHOTOSLAM_CHECK(std::ranges::equal(view->target.mask(), sensor_.mask.values()), "a mask of its own");
     color = color_of(view->target);
     depth = depth_of(view->target);
   }
@@ -46,7 +50,7 @@ void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
   serialize_image(a, depth);
   if (a.reading()) {
     view = &views_.emplace_back();
-    if (!color.empty()) set_images(color, depth, *view);
+    if (!color.empty()) set_images(color, depth, sensor_.mask, *view);
   }
   a(view->adjustment, view->exposure);
   if (depth.empty()) serialize_image(a, view->picture.depth);  // otherwise it follows from the depth image

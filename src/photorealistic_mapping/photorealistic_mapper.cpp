@@ -171,7 +171,7 @@ void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, c
   update_poses(map);
 
   TrainingView& newest = views_.emplace_back();
-  set_images(images.color, images.depth, newest);
+  set_images(images.color, images.depth, images.mask.empty() ? sensor_.mask : images.mask, newest);
   newest.exposure_is_known = options_.exposure.enabled && exposure;
   if (newest.exposure_is_known) {
     newest.exposure.start_from(*exposure);
@@ -219,8 +219,9 @@ void PhotorealisticMapper::keep_image_budget() {
   }
 }
 
-void PhotorealisticMapper::set_images(const ImageU8& color, const ImageU16& depth, TrainingView& view) const {
-  const CameraView full{sensor_.camera, color, depth, sensor_.mask};
+void PhotorealisticMapper::set_images(const ImageU8& color, const ImageU16& depth, const ImageU8& mask,
+                                      TrainingView& view) const {
+  const CameraView full{sensor_.camera, color, depth, mask};
   view.target = {full.camera.width, full.camera.height, full.color.values(), full.mask.values()};
   if (!depth.empty()) view.target.set_depth(depth.values(), static_cast<float>(sensor_.metres_per_depth_unit));
   view.picture = make_picture(full, sensor_.metres_per_depth_unit);

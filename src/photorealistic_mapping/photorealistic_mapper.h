@@ -145,7 +145,7 @@ class PhotorealisticMapper {
   SE3 view_from_world(size_t view) const;
   splatting::RenderOptions render_options() const;
   splatting::TrainOptions train_options(std::optional<double> progress) const;
-  void set_images(const ImageU8& color, const ImageU16& depth, TrainingView& view) const;
+  void set_images(const ImageU8& color, const ImageU16& depth, const ImageU8& mask, TrainingView& view) const;
   double megabytes(const TrainingView& view) const;
   void retire(size_t view);
   void release_culled(const MapSnapshot& map);

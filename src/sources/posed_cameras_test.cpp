@@ -88,8 +88,36 @@ TEST(PosedCameras, ColmapImagesMayHaveFeaturesAndErrorsNameTheLine) {
   EXPECT_EQ(read->back().camera.cx, 31.5);
   put("images.txt", "# comment\n1 1 0 0 0 0 0 0 7 a.png\n\n2 1 0 0 0 0 0 1 8 b.png\n\n");
   EXPECT_NE(read_colmap_cameras(folder, folder).error().message.find("images.txt:4: camera 8"), std::string::npos);
-  put("cameras.txt", "7 OPENCV 64 48 50 50 32 24 0.1 0 0 0\n");
-  EXPECT_NE(read_colmap_cameras(folder, folder).error().message.find("cameras.txt:1: camera model OPENCV"),
+  put("cameras.txt", "7 OPENCV 64 48 50 50 32 24 0.1 0 0\n");
+  EXPECT_NE(read_colmap_cameras(folder, folder).error().message.find("cameras.txt:1: 7 parameters"), std::string::npos);
+  put("cameras.txt", "\n7 FOV 64 48 50 50 32 24 0.1\n");
+  EXPECT_NE(read_colmap_cameras(folder, folder).error().message.find("cameras.txt:2: camera model FOV"),
+            std::string::npos);
+  put("cameras.txt", "7 SIMPLE_PINHOLE 64 48 -50 32 24\n");
+  EXPECT_NE(read_colmap_cameras(folder, folder).error().message.find("cameras.txt:1: focal lengths"),
+            std::string::npos);
+}
+
+TEST(PosedCameras, TransformsMayHaveLensesAndIntrinsicsPerFrame) {
+  const std::string pose = R"("transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]])";
+  const std::string intrinsics = R"("w": 8, "h": 6, "fl_x": 10, "fl_y": 11, "cx": 4, "cy": 3)";
+  const auto read = [&](const std::string& all, const std::string& frame) {
+    return read_transforms_json(write("{" + intrinsics + all + R"(, "frames": [{)" + pose + frame + "}]}"));
+  };
+  const auto lens = [&](const std::string& all, const std::string& frame) {
+    const auto cameras = read(all, frame);
+    EXPECT_TRUE(cameras.ok()) << cameras.error().message;
+    return cameras ? cameras->front().distortion : Distortion{};
+  };
+  EXPECT_TRUE(lens("", "").none());
+  EXPECT_EQ(lens(R"(, "k1": 0.1, "k2": 0.2, "p1": 0.3, "p2": 0.4, "k3": 0.5, "k4": 0)", ""),
+            (Distortion{.k1 = 0.1, .k2 = 0.2, .p1 = 0.3, .p2 = 0.4, .k3 = 0.5}));
+  EXPECT_EQ(lens(R"(, "camera_model": "OPENCV_FISHEYE", "k1": 0.1, "k2": 0.2, "k3": 0.3, "k4": 0.4)", ""),
+            (Distortion{.k1 = 0.1, .k2 = 0.2, .k3 = 0.3, .k4 = 0.4, .model = LensModel::kannala_brandt}));
+  EXPECT_EQ(lens(R"(, "k1": 0.1)", R"(, "k1": 0.7)").k1, 0.7) << "a frame's own";
+  EXPECT_EQ(read("", R"(, "w": 16, "fl_x": 20, "cx": 8)")->front().camera, (PinholeCamera{16, 6, 20, 11, 7.5, 2.5}));
+  EXPECT_NE(read(R"(, "k4": 0.1)", "").error().message.find("frame 0: k4"), std::string::npos);
+  EXPECT_NE(read(R"(, "camera_model": "EQUIRECTANGULAR")", "").error().message.find("camera_model EQUIRECTANGULAR"),
             std::string::npos);
 }
 
