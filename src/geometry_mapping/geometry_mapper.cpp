@@ -110,8 +110,9 @@ void GeometryMapper::insert(const KeyframeProposal& proposal) {
   }
   for (const auto& [keypoint, seen] : proposal.same_as) {
     const std::vector<LandmarkId>& landmarks = map_.keyframe(seen.keyframe).landmarks;
-    if (static_cast<size_t>(seen.keypoint) >= landmarks.size()) continue;  // culled meanwhile
-    const LandmarkId id = landmarks[static_cast<size_t>(seen.keypoint)];
+    const auto index = static_cast<size_t>(seen.keypoint);
+    if (index >= landmarks.size()) continue;  // it has been culled since
+    const LandmarkId id = landmarks[index];
     if (id.valid() && map_.add_observation(id, proposal.id, keypoint)) map_.update_view(id);
   }
 }

@@ -231,5 +231,31 @@ TEST(GeometryMapper, CorrectsLandmarksThatWereFusedInBetween) {
   EXPECT_EQ(map.landmark(ids[3]).observations.size(), 3u);
 }
 
+TEST(GeometryMapper, TakesAProposalThatPointsAtACulledKeyframe) {
+  PointWorld world;
+  Map built(PointWorld::kScaleFactor, PointWorld::kNumLevels);
+  for (int k = 0; k < 2; ++k) {
+    const SE3 pose = PointWorld::camera_from_world(0.2 * k);
+    built.add_keyframe(KeyframeId(k), world.observe(pose, k), pose);
+  }
+  const LandmarkId seen = built.add_landmark(Vec3(0, 0, 3), KeyframeId(0), 0);
+  built.set_parent(KeyframeId(1), KeyframeId(0));
+  built.cull_keyframe(KeyframeId(1));
+  GeometryMapper geometry({}, {}, world.camera, world.bf);
+  geometry.set_map(std::move(built));
+
+  KeyframeProposal proposal;
+  proposal.id = KeyframeId(2);
+  proposal.reference = KeyframeId(1);
+  proposal.camera_from_reference = PointWorld::camera_from_world(0.4) * PointWorld::camera_from_world(0.2).inverse();
+  proposal.frame = world.observe(PointWorld::camera_from_world(0.4), 2);
+  proposal.landmarks.resize(proposal.frame->size());
+  proposal.same_as = {{0, {KeyframeId(1), 0}}, {1, {KeyframeId(0), 0}}};
+  const GeometryUpdate update = geometry.process(proposal);
+  EXPECT_EQ(update.keyframe, KeyframeId(2));
+  EXPECT_EQ(geometry.map().keyframe(KeyframeId(2)).parent, KeyframeId(0)) << "the culled one's parent";
+  EXPECT_NE(geometry.map().keyframe(KeyframeId(2)).landmarks[0], seen);
+}
+
 }  // namespace
 }  // namespace photoslam

@@ -226,9 +226,9 @@ void Tracker::resolve_last_matches() {
   for (size_t i = 0; i < last_->size(); ++i) {
     TrackedPoint& point = last_matches_.point[i];
     if (last_matches_.matched[i] && map_ && map_->has(point.same_as.keyframe)) {
-      const Keyframe& keyframe = map_->keyframe(point.same_as.keyframe).keyframe;
-      const auto keypoint = static_cast<size_t>(point.same_as.keypoint);  // a culled keyframe has none
-      point.landmark = keypoint < keyframe.landmarks.size() ? keyframe.landmarks[keypoint] : LandmarkId();
+      const std::vector<LandmarkId>& landmarks = map_->keyframe(point.same_as.keyframe).keyframe.landmarks;
+      const auto index = static_cast<size_t>(point.same_as.keypoint);
+      point.landmark = index < landmarks.size() ? landmarks[index] : LandmarkId{};  // none once it is culled
       point.same_as = {};
     }
     if (const LandmarkView* view = map_ ? map_->find(point.landmark) : nullptr) {

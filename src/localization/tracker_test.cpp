@@ -108,6 +108,32 @@ TEST_F(TrackerTest, PosesFollowACorrectionOfTheirReferenceKeyframe) {
   EXPECT_LT(pose_error(final_pose, result.camera_from_world).position, 1e-9);
 }
 
+TEST_F(TrackerTest, AKeyframeMayBeCulledBeforeItsPointsAreKnown) {
+  const auto track = [&](int frame) {
+    const auto observed = world.observe(PointWorld::camera_from_world(frame / 30.0), frame);
+    return tracker.track(observed, snapshot, true);
+  };
+  ASSERT_TRUE(step(0, PointWorld::camera_from_world(0)).keyframe.has_value());
+  // The next keyframe and what it adds reach tracking late.
+  int frame = 1;
+  TrackingResult result;
+  while (!result.keyframe) {
+    ASSERT_LT(frame, 90);
+    result = track(frame++);
+    ASSERT_TRUE(result.has_pose) << result.reason;
+  }
+  const SE3 pose = PointWorld::camera_from_world((frame - 1) / 30.0);
+  mapper.add(result.keyframe->id, result.keyframe->frame, pose, world.point_of_keypoint);
+  const TrackingResult before = track(frame++);  // matches points of the pending keyframe
+  ASSERT_TRUE(before.has_pose) << before.reason;
+  mapper.cull(KeyframeId(1), KeyframeId(0));
+  snapshot = mapper.snapshot();
+  const SE3 truth = PointWorld::camera_from_world(frame / 30.0);
+  const TrackingResult after = track(frame);
+  ASSERT_TRUE(after.has_pose) << after.reason;
+  EXPECT_LT(pose_error(after.camera_from_world, truth).position, 1e-4);
+}
+
 TEST_F(TrackerTest, HeldOutFramesNeverBecomeKeyframes) {
   step(0, PointWorld::camera_from_world(0));
   for (int frame = 1; frame < 60; ++frame) {

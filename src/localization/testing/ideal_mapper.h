@@ -30,6 +30,10 @@ class IdealMapper {
       }
     }
   }
+  void cull(KeyframeId id, KeyframeId parent) {
+    map_.set_parent(id, parent);
+    map_.cull_keyframe(id);
+  }
   std::shared_ptr<const MapSnapshot> snapshot() { return map_.snapshot(); }
 
  private:
