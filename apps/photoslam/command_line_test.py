@@ -384,11 +384,11 @@ class RunTest(CommandLineTest):
 
     def test_poses_of_a_squinting_rig_are_those_of_the_rectified_camera(self):
         rig = self.folder / "rig"
-        self.assertEqual(photoslam("synth", "room", "--sensor", "stereo", "--lens", "radial", "--frames", "14", "--shrink",
+        self.assertEqual(photoslam("synth", "room", "--sensor", "stereo", "--lens", "radial", "--frames", "30", "--fps", "6", "--shrink",
                                    "2", "--noise", "0", "--output", rig).returncode, 0)
         output = self.run_deterministic("run", "--iterations-per-frame", "8", sequence=rig)
         report = json.loads((output / "report.json").read_text(encoding="utf-8"))
-        self.assertLess(report["ate"]["rot_rmse_deg"], 0.2)
+        self.assertLess(report["ate"]["rot_rmse_deg"], 0.3)  # the axes differ by more than 0.7
         result = photoslam("eval", output, "--poses", "truth", "--json")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertAlmostEqual(json.loads(result.stdout)["ate"]["rot_rmse_deg"], report["ate"]["rot_rmse_deg"], places=5)

@@ -11,7 +11,7 @@
 #include "base/result.h"
 #include "image/image.h"
 #include "sources/posed_cameras.h"
-#include "splatting/renderer.h"
+#include "splatting/loss.h"
 
 namespace photoslam {
 

@@ -24,6 +24,7 @@
 #include "photorealistic_mapping/view_geometry.h"
 #include "photorealistic_mapping/world_export.h"
 #include "posed_images.h"
+#include "run_folder.h"
 
 namespace photoslam {
 namespace {
