@@ -97,11 +97,17 @@ void GeometryMapper::insert(const KeyframeProposal& proposal) {
       recent_landmarks_.push_back(map_.add_landmark(world_from_camera * in_camera, initial->id, keypoint));
     }
   }
-  // The pose was estimated in an older map: it follows its reference keyframe into this one.
-  const SE3 camera_from_world =
-      proposal.reference.valid() ? proposal.camera_from_reference * map_.keyframe(proposal.reference).camera_from_world
-                                 : proposal.camera_from_reference;
-  map_.add_keyframe(proposal.id, proposal.frame, camera_from_world);
+  // The pose was estimated in an older map: it follows its reference keyframe into this one, and so does the unit in
+  // which others measure from this keyframe already.
+  SE3 camera_from_world = proposal.camera_from_reference;
+  double scale = 1.0;
+  if (proposal.reference.valid()) {
+    const Keyframe& reference = map_.keyframe(proposal.reference);
+    scale = reference.scale / proposal.reference_scale;
+    camera_from_world.translation *= scale;
+    camera_from_world = camera_from_world * reference.camera_from_world;
+  }
+  map_.add_keyframe(proposal.id, proposal.frame, camera_from_world).scale = scale;
   if (proposal.reference.valid()) map_.set_parent(proposal.id, map_.living(proposal.reference));
   for (const auto& [id, sighting] : proposal.sightings) map_.count_sightings(id, sighting.visible, sighting.found);
   for (size_t i = 0; i < proposal.landmarks.size(); ++i) {

@@ -257,5 +257,56 @@ TEST(GeometryMapper, TakesAProposalThatPointsAtACulledKeyframe) {
   EXPECT_NE(geometry.map().keyframe(KeyframeId(2)).landmarks[0], seen);
 }
 
+/// Two keyframes propose themselves one after the other, and a frame is tracked, before a loop changes the scale.
+TEST(GeometryMapper, WhatWasMeasuredBeforeACorrectionFollowsItsScale) {
+  constexpr double kGrowth = 1.7;
+  PointWorld world;
+  world.with_depth = false;
+  const auto truth = [](int k) { return PointWorld::camera_from_world(0.2 * k); };
+  Map built(PointWorld::kScaleFactor, PointWorld::kNumLevels);
+  std::vector<LandmarkId> landmark_of_point(world.points.size());
+  for (int k = 0; k < 2; ++k) {
+    built.add_keyframe(KeyframeId(k), world.observe(truth(k), k), truth(k));
+    if (k > 0) built.set_parent(KeyframeId(1), KeyframeId(0));
+    for (size_t i = 0; i < world.point_of_keypoint.size(); ++i) {
+      const auto point = static_cast<size_t>(world.point_of_keypoint[i]);
+      LandmarkId& landmark = landmark_of_point[point];
+      if (!landmark.valid()) {
+        landmark = built.add_landmark(world.points[point], KeyframeId(k), static_cast<int>(i));
+      } else if (built.add_observation(landmark, KeyframeId(k), static_cast<int>(i))) {
+        built.update_view(landmark);
+      }
+    }
+  }
+  std::vector<KeyframeProposal> proposals(2);
+  for (int k = 2; k < 4; ++k) {
+    KeyframeProposal& proposal = proposals[static_cast<size_t>(k - 2)];
+    proposal.id = KeyframeId(k);
+    proposal.frame = world.observe(truth(k), k);
+    proposal.reference = KeyframeId(k - 1);
+    proposal.camera_from_reference = truth(k) * truth(k - 1).inverse();
+    for (const int point : world.point_of_keypoint) {
+      proposal.landmarks.push_back(landmark_of_point[static_cast<size_t>(point)]);
+    }
+  }
+  const SE3 frame_from_last = truth(4) * truth(3).inverse();
+
+  GeometryMapper geometry({}, {}, world.camera, 0);
+  geometry.set_map(std::move(built));
+  const Sim3 grow(kGrowth, Quat::Identity(), Vec3::Zero());
+  geometry.correct({.new_world_from_old_world = {grow, grow}});
+  const auto expected = [&](int k) { return SE3(truth(k).rotation, kGrowth * truth(k).translation); };
+  for (const KeyframeProposal& proposal : proposals) {
+    geometry.process(proposal);
+    const Keyframe& keyframe = geometry.map().keyframe(proposal.id);
+    EXPECT_DOUBLE_EQ(keyframe.scale, kGrowth);
+    EXPECT_LT((keyframe.camera_from_world * expected(proposal.id.value).inverse()).log().norm(), 1e-4);
+  }
+  // As the final pose of a frame is found.
+  const Keyframe& last = geometry.map().keyframe(KeyframeId(3));
+  const SE3 frame = SE3(frame_from_last.rotation, last.scale * frame_from_last.translation) * last.camera_from_world;
+  EXPECT_LT((frame * expected(4).inverse()).log().norm(), 1e-4);
+}
+
 }  // namespace
 }  // namespace photoslam

@@ -33,6 +33,7 @@ struct KeyframeProposal {
   std::shared_ptr<const FeatureFrame> frame;
   KeyframeId reference;               ///< Invalid for the first keyframe of a map, …
   SE3 camera_from_reference;          ///< … whose pose this is then in the world.
+  double reference_scale = 1.0;       ///< Keyframe::scale of the reference when this was made.
   std::vector<LandmarkId> landmarks;  ///< [N] matched landmark of each keypoint.
   /// Keypoints that see what a keypoint of an earlier keyframe sees, whose landmark tracking did not know yet.
   std::vector<std::pair<int, LandmarkObservation>> same_as;

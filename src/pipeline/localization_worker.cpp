@@ -83,8 +83,8 @@ FrameOutcome LocalizationWorker::process(FedFrame fed, std::shared_ptr<const Map
   auto images = std::make_shared<KeyframeImages>(KeyframeImages{to_rgb(color), std::move(depth), std::move(right)});
   if (result.keyframe) {
     outcome.keyframe = result.keyframe->id;
-    const double reference_scale = scale_of(map.get(), result.keyframe->reference);
-    keyframe = NewKeyframe{std::move(*result.keyframe), images, std::move(initial_images_), reference_scale};
+    result.keyframe->reference_scale = scale_of(map.get(), result.keyframe->reference);
+    keyframe = NewKeyframe{std::move(*result.keyframe), images, std::move(initial_images_)};
   }
   initial_images_ = is_initial_view ? std::move(images) : nullptr;
   return outcome;

@@ -18,7 +18,6 @@ struct NewKeyframe {
   KeyframeProposal proposal;
   std::shared_ptr<const KeyframeImages> images;
   std::shared_ptr<const KeyframeImages> initial_images;  ///< Of proposal.initial, if there is one.
-  double reference_scale = 1.0;  ///< Keyframe::scale of the proposal's reference when it was made.
 };
 
 /// Everything that happens to a frame before mapping: rectification, features, tracking, and bookkeeping of times.

@@ -225,13 +225,7 @@ Stage<LoopMessage>::Work Session::loop_work() {
 }
 
 void Session::add_keyframe(NewKeyframe keyframe) {
-  KeyframeProposal& proposal = keyframe.proposal;
-  const bool is_known =
-      proposal.reference.valid() && static_cast<size_t>(proposal.reference.value) < geometry_.map().num_keyframes();
-  if (is_known) {
-    proposal.camera_from_reference.translation *=
-        geometry_.map().keyframe(proposal.reference).scale / keyframe.reference_scale;
-  }
+  const KeyframeProposal& proposal = keyframe.proposal;
   const auto interrupted = [this] { return !logical_time_ && geometry_stage_.backlog() > 0; };
   GeometryUpdate update = geometry_.process(proposal, interrupted);
   if (logical_time_) {
