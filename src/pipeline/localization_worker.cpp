@@ -41,8 +41,8 @@ bool LocalizationWorker::is_mapped(const Frame& frame) {
   return 1e-9 * static_cast<double>(frame.timestamp_ns - *first_ns_) <= settings_.map_until_s;
 }
 
-FrameOutcome LocalizationWorker::process(FedFrame fed, std::shared_ptr<const MapSnapshot> map, bool keyframes_allowed,
-                                         std::optional<NewKeyframe>& keyframe) {
+FrameOutcome LocalizationWorker::process(FedFrame fed, const std::shared_ptr<const MapSnapshot>& map,
+                                         bool keyframes_allowed, std::optional<NewKeyframe>& keyframe) {
   Frame& frame = fed.frame;
   FrameOutcome outcome;
   outcome.frame = frame.id;

@@ -34,7 +34,7 @@ class LocalizationWorker {
   void resume(int num_keyframes, int next_place) { tracker_.resume(num_keyframes, next_place); }
 
   /// `keyframes_allowed` is false while mapping cannot take another one.
-  FrameOutcome process(FedFrame fed, std::shared_ptr<const MapSnapshot> map, bool keyframes_allowed,
+  FrameOutcome process(FedFrame fed, const std::shared_ptr<const MapSnapshot>& map, bool keyframes_allowed,
                        std::optional<NewKeyframe>& keyframe);
 
  private:
