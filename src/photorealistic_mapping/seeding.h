@@ -34,9 +34,8 @@ struct SeedingOptions {
 ///
 /// A cell of the image becomes one gaussian, a disc on the measured surface as large as its cell, where `render` (of
 /// the present map, same camera) does not explain it: mostly transparent, behind the measurement, or of another colour.
-/// Cells without depth take the nearest measured one, of several the farthest, and only where the map is
-/// transparent. Cells without data in
-/// three quarters of their pixels are left out.
+/// Cells without depth take the nearest measured one, of several the farthest, and only where the map is transparent.
+/// Cells without data in three quarters of their pixels are left out.
 ///
 /// `cell` is in pixels of `view`.
 std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const DepthPicture& view,
