@@ -7,7 +7,10 @@
 namespace photoslam {
 
 void KeyframeDepthOptions::visit(OptionVisitor& v) {
-  v.value({"enabled", "", 0, 0, "Measure depth by comparing pictures where no sensor does."}, enabled);
+  v.value({"enabled", "", 0, 0, "Measure depth by comparing pictures where no sensor does …"}, enabled);
+  v.value({"min_unexplained", "", 0.0, 1.0,
+           "… and the map leaves at least this share of the picture transparent or shows it in another colour."},
+          min_unexplained);
   v.value({"neighbours", "", 0, 16, "Earlier keyframes to compare with, besides the right image of a stereo rig."},
           neighbours);
   v.value({"min_parallax", "", 0.0, 1.0, "Nearer keyframes measure too little: distance over median depth."},

@@ -32,6 +32,9 @@ DepthPicture make_picture(const CameraView& full, double metres_per_depth_unit) 
   return picture;
 }
 
+/// Side of the cells that are seeded, in pixels of the picture that seeds are made of.
+int cell_size(const SeedingOptions& options) { return std::max(1, options.cell_px / kSeedingFactor); }
+
 /// A GPU has no reason to spare pixels.
 ScheduleOptions schedule_options(ScheduleOptions options, bool on_gpu) {
   if (on_gpu) options.online_pixels = std::numeric_limits<int>::max();
@@ -181,7 +184,7 @@ void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, c
   if (!images.right.empty()) newest.right = shrink_color(images.right, kSeedingFactor);
   const size_t index = views_.size() - 1;
   // A single camera's first keyframe has none before it to compare with: it gets its depth from the second.
-  if (index > 0 && views_[index - 1].picture.depth.empty()) seed_keyframe(map, index - 1, executor);
+  if (index > 0 && views_[index - 1].lacks_depth) seed_keyframe(map, index - 1, executor);
   seed_keyframe(map, index, executor);
   prune(options_.densification, scene_depth_, model_);
   keep_image_budget();
@@ -229,10 +232,16 @@ void PhotorealisticMapper::set_images(const ImageU8& color, const ImageU16& dept
 
 void PhotorealisticMapper::seed_keyframe(const MapSnapshot& map, size_t view, Executor& executor) {
   DepthPicture& picture = views_[view].picture;
-  if (picture.depth.empty() && options_.depth.enabled) sweep_picture(map, view, executor);
+  show(view, executor);
+  if (picture.depth.empty() && options_.depth.enabled) {
+    const double unexplained = unexplained_share(options_.seeding, picture, render_, cell_size(options_.seeding));
+    const bool is_wanted = unexplained >= options_.depth.min_unexplained;
+    if (is_wanted) sweep_picture(map, view, executor);
+    views_[view].lacks_depth = is_wanted && picture.depth.empty();
+  }
   const Keyframe& keyframe = map.keyframe(KeyframeId(static_cast<int32_t>(view))).keyframe;
   newest_features_ = feature_depths(options_.feature_depth, map, keyframe, picture, kSeedingFactor);
-  seed(view, options_.seeding.cell_px, options_.seeding.min_color_error, newest_features_, executor);
+  seed(view, cell_size(options_.seeding), options_.seeding.min_color_error, newest_features_);
 }
 
 void PhotorealisticMapper::sweep_picture(const MapSnapshot& map, size_t index, Executor& executor) {
@@ -282,18 +291,21 @@ void PhotorealisticMapper::render_picture(size_t index, Executor& executor) {
   renderer_.render(model_, {camera, camera_from_anchor_}, render_options(), executor, render_);
 }
 
-void PhotorealisticMapper::seed(size_t index, int cell, double min_color_error, std::span<const DepthPixel> features,
-                                Executor& executor) {
+/// The map as the view's small picture shows it, as bright as the picture.
+void PhotorealisticMapper::show(size_t index, Executor& executor) {
+  TrainingView& view = views_[index];
+  render_picture(index, executor);
+  if (!options_.exposure.enabled) return;
+  const bool unused = schedule_.uses(static_cast<int>(index)) == 0;
+  if (index > 0 && unused && !view.exposure_is_known) view.exposure.match(view.picture, render_);
+  apply(view.exposure.exposure(), render_);
+}
+
+void PhotorealisticMapper::seed(size_t index, int cell, double min_color_error, std::span<const DepthPixel> features) {
   TrainingView& view = views_[index];
   const DepthPicture& picture = view.picture;
-  render_picture(index, executor);
-  const bool unused = schedule_.uses(static_cast<int>(index)) == 0;
-  if (options_.exposure.enabled && index > 0 && unused && !view.exposure_is_known) {
-    view.exposure.match(picture, render_);
-  }
   const splatting::Exposure exposure = view.exposure.exposure();
-  if (options_.exposure.enabled) apply(exposure, render_);
-  auto seeds = seed_cells(options_.seeding, picture, render_, std::max(1, cell / kSeedingFactor), min_color_error);
+  auto seeds = seed_cells(options_.seeding, picture, render_, cell, min_color_error);
   const auto at_features = seed_features(options_.seeding, picture, kSeedingFactor, render_, features);
   seeds.insert(seeds.end(), at_features.begin(), at_features.end());
   const auto limit = static_cast<size_t>(options_.densification.max_gaussians);
@@ -381,7 +393,8 @@ void PhotorealisticMapper::maintain(std::optional<double> progress, Executor& ex
   if (growing && options_.reseed_interval > 0 && iteration_ % options_.reseed_interval == 0) {
     const auto active = schedule_.active();
     const auto view = active[static_cast<size_t>(random_.index(static_cast<int>(active.size())))];
-    seed(static_cast<size_t>(view), options_.seeding.cell_px / 2, options_.reseed_color_error, {}, executor);
+    show(static_cast<size_t>(view), executor);
+    seed(static_cast<size_t>(view), std::max(1, cell_size(options_.seeding) / 2), options_.reseed_color_error, {});
   }
   if (iteration_ % options_.densification.interval != 0) return;
   if (progress && growing && options_.densification.enabled) {

@@ -135,6 +135,7 @@ class PhotorealisticMapper {
     PoseAdjustment adjustment;  // photometric correction of the keyframe's pose
     ExposureAdjustment exposure;
     bool exposure_is_known = false;  // from elsewhere; the map is not asked
+    bool lacks_depth = false;        // wanted for seeding, but not to be had yet
     splatting::TargetImage target;
     DepthPicture picture;  // half the size, for seeding
     ImageU8 right;         // stereo: grey, half the size
@@ -155,7 +156,8 @@ class PhotorealisticMapper {
   void rescale(size_t view, double factor);
   void seed_keyframe(const MapSnapshot& map, size_t view, Executor& executor);
   void sweep_picture(const MapSnapshot& map, size_t view, Executor& executor);
-  void seed(size_t view, int cell, double min_color_error, std::span<const DepthPixel> features, Executor& executor);
+  void show(size_t view, Executor& executor);
+  void seed(size_t view, int cell, double min_color_error, std::span<const DepthPixel> features);
   void render_picture(size_t view, Executor& executor);
   void maintain(std::optional<double> progress, Executor& executor);
 

@@ -56,7 +56,7 @@ class PhotorealisticMapperTest : public ::testing::Test {
 TEST_F(PhotorealisticMapperTest, StereoSeedsTheSurfaceFromOneKeyframe) {
   PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
   add(mapper, at(0), stereo(at(0)));
-  EXPECT_GT(mapper.gaussians().size(), 800u) << "one per cell of 8 pixels";
+  EXPECT_GT(mapper.gaussians().size(), 800u) << "one per cell of 6 pixels";
   EXPECT_GT(share_on_the_wall(mapper, 0.08), 0.9);
 }
 
@@ -68,6 +68,25 @@ TEST_F(PhotorealisticMapperTest, ASingleCameraSeedsBothKeyframesFromTheSecondOn)
   add(mapper, at(0.3, 0.05), {});
   EXPECT_GT(mapper.gaussians().size(), 800u);
   EXPECT_GT(share_on_the_wall(mapper, 0.08), 0.9);
+}
+
+TEST_F(PhotorealisticMapperTest, DepthIsMeasuredOnlyForWhatTheMapDoesNotExplain) {
+  const auto growth = [&](double min_unexplained) {
+    PhotorealisticOptions options;
+    options.depth.min_unexplained = min_unexplained;
+    options.reseed_interval = 0;
+    options.densification.interval = 1000;
+    PhotorealisticMapper mapper(options, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
+    world_ = testing::WallWithKeyframes{kCamera};
+    count_ = 0;
+    add(mapper, at(0), stereo(at(0)));
+    for (int i = 0; i < 60; ++i) mapper.train({}, executor_);
+    const size_t before = mapper.gaussians().size();
+    add(mapper, at(0.6), stereo(at(0.6)));  // an eighth of the picture is new
+    return static_cast<int>(mapper.gaussians().size()) - static_cast<int>(before);
+  };
+  const int measured = growth(0.02), features_only = growth(0.9);
+  EXPECT_GT(measured, features_only + 100);
 }
 
 TEST_F(PhotorealisticMapperTest, TrainingImprovesTheRender) {
@@ -106,7 +125,9 @@ TEST_F(PhotorealisticMapperTest, ColorsBecomeViewDependentOneDegreeAfterTheOther
 }
 
 TEST_F(PhotorealisticMapperTest, WhatNoPictureNeedsIsRemovedWhileFramesArrive) {
-  PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
+  PhotorealisticOptions options;
+  options.seeding.cell_px = 8;  // a wall without gaps that something behind could fill
+  PhotorealisticMapper mapper(options, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
   for (const double x : {0.0, 0.3}) add(mapper, at(x), stereo(at(x)));
   splatting::Gaussian hidden{};
   hidden.mean[2] = 9;  // behind the wall at 4 m
@@ -192,7 +213,8 @@ TEST_F(PhotorealisticMapperTest, ASimilarityOfMapAndCamerasLeavesEveryImageTheSa
   PhotorealisticOptions options;
   options.sh_degree = 3;
   options.exposure.enabled = false;  // brightness stays
-  // Coarse pictures make large splats: few edges, and few that are equally far.
+  // Coarse pictures and cells make large splats: few edges, and few that are equally far.
+  options.seeding.cell_px = 8;
   options.schedule.online_pixels = kCamera.width * kCamera.height / 4;
   options.schedule.start_pixels = kCamera.width * kCamera.height / 16;
   PhotorealisticMapper mapper(options, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
@@ -263,6 +285,7 @@ TEST_F(PhotorealisticMapperTest, ForgetsPicturesBeyondTheBudgetAndGoesOn) {
   const MapperSensor sensor{.camera = kCamera, .stereo_baseline_m = kBaseline};
   PhotorealisticOptions options;
   options.schedule.start_pixels = 80 * 60;
+  options.seeding.cell_px = 8;  // gaussians take little beside pictures
   // 320x240: colour on three levels, half of it again for seeding with depth, and the right image.
   const double one_view_mb = 1e-6 * 320 * 240 * (3 * (1 + 1 / 4.0 + 1 / 16.0) + (3 + 4 + 1) / 4.0);
   options.image_budget_mb = 3.5 * one_view_mb;

@@ -22,10 +22,9 @@ struct Cell {
   double color_error = 0;              // squared difference of the means, summed over channels
   double transmittance = 1;
   bool has_data = false;
-  double rendered_depth = 0;  // 0 where next to nothing was drawn
-  double depth = 0;           // measured [m]; 0 = none
-  bool measured = false;      // depth is the cell's own
-  int distance = 0;           // to the cell whose depth it is [cells]
+  double depth = 0;       // measured [m]; 0 = none
+  bool measured = false;  // depth is the cell's own
+  int distance = 0;       // to the cell whose depth it is [cells]
   Vec2 center() const { return {0.5 * (x0 + x1 - 1), 0.5 * (y0 + y1 - 1)}; }
 };
 
@@ -62,7 +61,7 @@ Cell summarize_cell(const DepthPicture& view, const splatting::RenderResult& ren
   cell.y1 = std::min(cell.y0 + size, view.camera.height);
   const size_t plane = static_cast<size_t>(view.camera.width) * static_cast<size_t>(view.camera.height);
   Vec3 rendered = Vec3::Zero();
-  double alpha = 0, depth = 0;
+  double alpha = 0;
   int pixels = 0;
   for (int y = cell.y0; y < cell.y1; ++y) {
     for (int x = cell.x0; x < cell.x1; ++x) {
@@ -73,7 +72,6 @@ Cell summarize_cell(const DepthPicture& view, const splatting::RenderResult& ren
       rendered += Vec3(static_cast<double>(render.rgb[i]), static_cast<double>(render.rgb[plane + i]),
                        static_cast<double>(render.rgb[2 * plane + i]));
       alpha += static_cast<double>(render.alpha[i]);
-      depth += static_cast<double>(render.depth[i]);
     }
   }
   cell.has_data = 4 * pixels >= (cell.x1 - cell.x0) * (cell.y1 - cell.y0);
@@ -81,10 +79,21 @@ Cell summarize_cell(const DepthPicture& view, const splatting::RenderResult& ren
   cell.color /= pixels;
   cell.color_error = (rendered / pixels - cell.color).squaredNorm();
   cell.transmittance = 1.0 - alpha / pixels;
-  cell.rendered_depth = alpha > 0.1 * pixels ? depth / alpha : 0;
   if (!view.depth.empty()) cell.depth = median_depth(view.depth, cell);
   cell.measured = cell.depth > 0;
   return cell;
+}
+
+CellGrid summarize(const DepthPicture& view, const splatting::RenderResult& render, int cell_size) {
+  CellGrid grid;
+  grid.columns = (view.camera.width + cell_size - 1) / cell_size;
+  grid.rows = (view.camera.height + cell_size - 1) / cell_size;
+  for (int row = 0; row < grid.rows; ++row) {
+    for (int column = 0; column < grid.columns; ++column) {
+      grid.cells.push_back(summarize_cell(view, render, column, row, cell_size));
+    }
+  }
+  return grid;
 }
 
 /// Cells without a measurement take their depth from the nearest cells that have one, ring by ring; of several the
@@ -176,10 +185,8 @@ void SeedingOptions::visit(OptionVisitor& v) {
           max_stretch);
   v.value({"opacity", "", 0.02, 0.98, "Opacity at birth."}, opacity);
   v.value({"min_transmittance", "", 0.0, 1.0,
-           "Cells and features that the map leaves more transparent than this are seeded, …"},
+           "Cells and features that the map leaves more transparent than this are seeded …"},
           min_transmittance);
-  v.value({"min_depth_ratio", "", 0.0, 1.0, "… those measured nearer than this share of the rendered depth, …"},
-          min_depth_ratio);
   v.value({"min_color_error", "", 0.0, 3.0, "… and those whose mean colour is off by more (squared, all channels)."},
           min_color_error);
   v.value({"feature_sigma_px", "px", 0.3, 20.0, "Standard deviation of a gaussian at an inactive feature."},
@@ -193,14 +200,7 @@ std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const
                                             const splatting::RenderResult& render, int cell_size,
                                             double min_color_error) {
   if (!options.dense) return {};
-  CellGrid grid;
-  grid.columns = (view.camera.width + cell_size - 1) / cell_size;
-  grid.rows = (view.camera.height + cell_size - 1) / cell_size;
-  for (int row = 0; row < grid.rows; ++row) {
-    for (int column = 0; column < grid.columns; ++column) {
-      grid.cells.push_back(summarize_cell(view, render, column, row, cell_size));
-    }
-  }
+  CellGrid grid = summarize(view, render, cell_size);
   fill_missing_depth(grid);
 
   std::vector<splatting::Gaussian> seeds;
@@ -209,15 +209,25 @@ std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const
       const Cell& cell = grid.at(column, row);
       if (!(cell.depth > 0) || !cell.has_data) continue;
       const bool uncovered = cell.transmittance > options.min_transmittance;
-      const bool in_front = cell.rendered_depth > 0 && cell.depth < options.min_depth_ratio * cell.rendered_depth;
       const bool wrong_color = cell.color_error > min_color_error;
-      if (!uncovered && !(cell.measured && (in_front || wrong_color))) continue;
+      if (!uncovered && !(cell.measured && wrong_color)) continue;
       const double sigma = options.sigma_cells * cell_size * cell.depth / view.camera.fx;
       seeds.push_back(make_disc(options, view.camera.unproject(cell.center(), cell.depth),
                                 surface_normal(grid, view.camera, column, row), sigma, cell.color));
     }
   }
   return seeds;
+}
+
+double unexplained_share(const SeedingOptions& options, const DepthPicture& view, const splatting::RenderResult& render,
+                         int cell_size) {
+  int with_data = 0, unexplained = 0;
+  for (const Cell& cell : summarize(view, render, cell_size).cells) {
+    if (!cell.has_data) continue;
+    ++with_data;
+    unexplained += cell.transmittance > options.min_transmittance || cell.color_error > options.min_color_error;
+  }
+  return with_data > 0 ? static_cast<double>(unexplained) / with_data : 0;
 }
 
 std::vector<splatting::Gaussian> seed_features(const SeedingOptions& options, const DepthPicture& view, int factor,

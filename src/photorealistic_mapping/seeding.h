@@ -17,13 +17,12 @@ struct SeedingOptions {
   bool dense = true;
   bool active_features = true;
   bool inactive_features = true;
-  int cell_px = 8;
+  int cell_px = 6;
   double sigma_cells = 0.7;
   double thickness = 0.2;
   double max_stretch = 2.9;
   double opacity = 0.3;
   double min_transmittance = 0.5;
-  double min_depth_ratio = 0.9;
   double min_color_error = 0.10;
   double feature_sigma_px = 2.0;
   double feature_color_error = 0.05;
@@ -33,13 +32,18 @@ struct SeedingOptions {
 /// New gaussians in the frame of the view's camera.
 ///
 /// A cell of the image becomes one gaussian, a disc on the measured surface as large as its cell, where `render` (of
-/// the present map, same camera) does not explain it: mostly transparent, behind the measurement, or of another colour.
+/// the present map, same camera) does not explain it: mostly transparent, or of another colour. A measurement before
+/// what is drawn is no reason: where it looks right, it is more often the measurement that is wrong.
 /// Cells without depth take the nearest measured one, of several the farthest, and only where the map is transparent.
 /// Cells without data in three quarters of their pixels are left out.
 ///
 /// `cell` is in pixels of `view`.
 std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const DepthPicture& view,
                                             const splatting::RenderResult& render, int cell, double min_color_error);
+
+/// Share of the cells with data that `render` leaves mostly transparent or shows in another colour.
+double unexplained_share(const SeedingOptions& options, const DepthPicture& view, const splatting::RenderResult& render,
+                         int cell);
 
 /// Geometry-based densification (paper, Sec. 3.3.1): gaussians at features, the places of complex texture, as large as
 /// their pixel's footprint, where the render of the present map is mostly transparent or of another colour. `view` is

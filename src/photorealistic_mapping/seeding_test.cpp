@@ -115,7 +115,7 @@ TEST(SeedCells, WhatTheMapExplainsIsNotSeeded) {
   Scene scene(2.0);
   scene.render_exactly();
   EXPECT_TRUE(seed_cells(options, scene.view, scene.render, kCell, options.min_color_error).empty());
-  // A block of another colour, and one that stands in front of the rendered surface.
+  // A block of another colour; and one that is measured before the surface that is drawn, but looks like it.
   for (int y = 8; y < 12; ++y) {
     for (int x = 8; x < 12; ++x) {
       for (int c = 0; c < 3; ++c) scene.view.color(x, y, c) = 255;
@@ -123,9 +123,25 @@ TEST(SeedCells, WhatTheMapExplainsIsNotSeeded) {
     }
   }
   const auto seeds = seed_cells(options, scene.view, scene.render, kCell, options.min_color_error);
-  ASSERT_EQ(seeds.size(), 2u);
+  ASSERT_EQ(seeds.size(), 1u);
   EXPECT_NEAR(seeds[0].mean[2], 2.0, 1e-6);
-  EXPECT_NEAR(seeds[1].mean[2], 1.5, 1e-6);
+}
+
+TEST(UnexplainedShare, CountsCellsWithDataThatLookWrong) {
+  const SeedingOptions options;
+  Scene scene(2.0);
+  EXPECT_EQ(unexplained_share(options, scene.view, scene.render, kCell), 1.0) << "an empty map explains nothing";
+  scene.render_exactly();
+  EXPECT_EQ(unexplained_share(options, scene.view, scene.render, kCell), 0.0);
+  for (size_t i = 0; i < 64 * 12; ++i) scene.render.alpha[i] = 0;  // a quarter
+  EXPECT_DOUBLE_EQ(unexplained_share(options, scene.view, scene.render, kCell), 0.25);
+  for (int y = 24; y < 36; ++y) {  // and another, in another colour
+    for (int x = 0; x < 64; ++x) scene.view.color(x, y, 0) = 255;
+  }
+  EXPECT_DOUBLE_EQ(unexplained_share(options, scene.view, scene.render, kCell), 0.5);
+  scene.view.mask = ImageU8(64, 48, 1, 255);
+  std::fill_n(scene.view.mask.values().begin(), 64 * 12, uint8_t{0});
+  EXPECT_NEAR(unexplained_share(options, scene.view, scene.render, kCell), 1.0 / 3, 1e-12);
 }
 
 TEST(SeedCells, HolesTakeTheNearestDepthOnlyWhereNothingIsDrawn) {
