@@ -1,0 +1,118 @@
+#!/usr/bin/env python3
+# Copyright the photoslam authors.
+# SPDX-License-Identifier: Apache-2.0
+"""What gpu_check.sh reports, with stand-ins for the tools of a machine that has a GPU."""
+
+import os
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+SCRIPT = Path(__file__).resolve().parent / "gpu_check.sh"
+
+# Makes stand-ins of what the engine's build makes; what they print and end with is in the environment.
+CMAKE = """
+make() { echo "#!/usr/bin/env bash
+$2" >"$1" && chmod +x "$1"; }
+case $1 in
+  -S) mkdir -p "$4" ;;
+  --build)
+    make "$2/engine_host_test" 'exit ${HOST_TESTS:-0}'
+    if command -v nvcc >/dev/null; then
+      make "$2/engine_device_test" '[ "${TESTS_HANG:-}" = "" ] || sleep 60'
+      make "$2/engine_bench" 'echo "{}"'
+    fi ;;
+esac
+exit ${BUILD:-0}
+"""
+GPU = 'echo "Stand-in, 1.2, 9.0"'
+SANITIZER = 'case $2 in ${BAD_TOOL:-none}) exit 1 ;; esac'
+TOOLS = ("awk bash cat chmod cp cut date dirname env git grep head ls mkdir nproc rm sed setsid sleep tail tar tee timeout tr "
+         "xz").split()
+
+
+class GpuCheckTest(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.folder = Path(scratch.name)
+        (self.folder / "scripts").mkdir()
+        (self.folder / "bin").mkdir()
+        (self.folder / "scripts" / "gpu_check.sh").write_bytes(SCRIPT.read_bytes())
+        for tool in TOOLS:
+            path = subprocess.run(["which", tool], check=True, capture_output=True, text=True).stdout.strip()
+            (self.folder / "bin" / tool).symlink_to(path)
+        self.add_tool("cmake", CMAKE)
+
+    def add_tool(self, name, script):
+        path = self.folder / "bin" / name
+        path.write_text(f"#!/usr/bin/env bash\n{script}\n", encoding="utf-8")
+        path.chmod(0o755)
+
+    def check(self, **variables):
+        """Runs the script; its exit status and the report."""
+        result = subprocess.run(["bash", "scripts/gpu_check.sh"], cwd=self.folder, capture_output=True, text=True,
+                                env={"PATH": str(self.folder / "bin"), "CUDA_HOME": str(self.folder), **variables}, check=False)
+        reports = list((self.folder / "output" / "gpu_check").glob("gpu-*.md"))
+        self.assertEqual(len(reports), 1, result.stderr)
+        return result.returncode, reports[0].read_text(encoding="utf-8")
+
+    def test_a_tool_that_is_missing_is_not_checked(self):
+        self.add_tool("nvidia-smi", GPU)
+        self.add_tool("nvcc", "true")
+        status, report = self.check()
+        self.assertEqual(status, 3)
+        for tool in ("memcheck", "racecheck", "initcheck", "synccheck"):
+            self.assertIn(f"| {tool} | not checked (there is no compute-sanitizer) |", report)
+        self.assertIn("3 passed, 0 failed, 5 not checked", report)
+        self.assertIn("Not checked: memcheck; program; racecheck; initcheck; synccheck.", report)
+
+    def test_what_the_sanitizer_finds_is_a_failure(self):
+        self.add_tool("nvidia-smi", GPU)
+        self.add_tool("nvcc", "true")
+        self.add_tool("compute-sanitizer", SANITIZER)
+        status, report = self.check(BAD_TOOL="racecheck")
+        self.assertEqual(status, 1)
+        self.assertIn("| memcheck | passed |", report)
+        self.assertIn("| racecheck | FAILED (1) |", report)
+        self.assertIn("FAILED: racecheck.", report)
+
+    def test_without_nvcc_nothing_passes_on_the_gpu(self):
+        self.add_tool("nvidia-smi", GPU)
+        self.add_tool("compute-sanitizer", SANITIZER)
+        status, report = self.check()
+        self.assertEqual(status, 3)
+        self.assertIn("| tests on the GPU | not checked (they were not built: is there an nvcc?) |", report)
+        self.assertIn("| memcheck | not checked (the tests were not built) |", report)
+
+    def test_a_failed_build_does_not_end_the_report(self):
+        self.add_tool("nvidia-smi", GPU)
+        status, report = self.check(BUILD="1")
+        self.assertEqual(status, 1)
+        self.assertIn("| build | FAILED (1) |", report)
+        self.assertIn("FAILED: build.", report)
+
+    def test_time_runs_out(self):
+        self.add_tool("nvidia-smi", GPU)
+        self.add_tool("nvcc", "true")
+        status, report = self.check(TESTS_HANG="1", SECONDS_ALLOWED="5")
+        self.assertEqual(status, 1)
+        self.assertRegex(report, r"\| tests on the GPU \| FAILED \(stopped after [345] s\) \|")
+        self.assertIn("| bench of the engine | not checked (no time left) |", report)
+
+    def test_without_a_gpu_it_says_so(self):
+        self.add_tool("nvidia-smi", 'echo "NVIDIA-SMI has failed"; exit 9')
+        status, report = self.check()
+        self.assertEqual(status, 2)
+        self.assertIn("| tests on the host | passed |", report)
+        self.assertIn("No GPU was found: nothing above says anything about one.", report)
+
+    def test_failing_host_tests_are_reported(self):
+        status, report = self.check(HOST_TESTS="1")
+        self.assertEqual(status, 2)
+        self.assertIn("| tests on the host | FAILED (1) |", report)
+
+
+if __name__ == "__main__":
+    unittest.main()
