@@ -50,13 +50,20 @@ class GpuCheckTest(unittest.TestCase):
         path.write_text(f"#!/usr/bin/env bash\n{script}\n", encoding="utf-8")
         path.chmod(0o755)
 
-    def check(self, **variables):
-        """Runs the script; its exit status and the report."""
-        result = subprocess.run(["bash", "scripts/gpu_check.sh"], cwd=self.folder, capture_output=True, text=True,
-                                env={"PATH": str(self.folder / "bin"), "CUDA_HOME": str(self.folder), **variables}, check=False)
+    def start(self, **variables):
+        return subprocess.Popen(["bash", "scripts/gpu_check.sh"], cwd=self.folder, stdout=subprocess.PIPE,
+                                stderr=subprocess.STDOUT, text=True,
+                                env={"PATH": str(self.folder / "bin"), "CUDA_HOME": str(self.folder), **variables})
+
+    def report_of(self, process):
+        """Its exit status and what it has written."""
+        output, _ = process.communicate()
         reports = list((self.folder / "output" / "gpu_check").glob("gpu-*.md"))
-        self.assertEqual(len(reports), 1, result.stderr)
-        return result.returncode, reports[0].read_text(encoding="utf-8")
+        self.assertEqual(len(reports), 1, output)
+        return process.returncode, reports[0].read_text(encoding="utf-8")
+
+    def check(self, **variables):
+        return self.report_of(self.start(**variables))
 
     def test_a_tool_that_is_missing_is_not_checked(self):
         self.add_tool("nvidia-smi", GPU)
@@ -100,6 +107,17 @@ class GpuCheckTest(unittest.TestCase):
         self.assertEqual(status, 1)
         self.assertRegex(report, r"\| tests on the GPU \| FAILED \(stopped after [345] s\) \|")
         self.assertIn("| bench of the engine | not checked (no time left) |", report)
+
+    def test_whoever_stops_it_gets_the_report_so_far(self):
+        self.add_tool("nvidia-smi", GPU)
+        self.add_tool("nvcc", "true")
+        process = self.start(TESTS_HANG="1")
+        next(line for line in process.stdout if "| build | passed" in line)
+        process.terminate()
+        status, report = self.report_of(process)
+        self.assertEqual(status, 1)
+        self.assertIn("The run was stopped before its end.", report)
+        self.assertIn("1 passed, 0 failed, 0 not checked", report)
 
     def test_without_a_gpu_it_says_so(self):
         self.add_tool("nvidia-smi", 'echo "NVIDIA-SMI has failed"; exit 9')
