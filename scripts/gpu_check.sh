@@ -10,9 +10,9 @@
 #   scripts/gpu_check.sh bundle [FILE]    beforehand, where build/release is
 #   scripts/gpu_check.sh [check] [FILE]   on the machine with the GPU
 #
-# FILE, build/gpu_bundle.tar.xz by default, holds the program with its libraries and the sources to build there, and
+# FILE, build/gpu_bundle.tar.gz by default, holds the program with its libraries and the sources to build there, and
 # FILE.rooms.tar (its ending replaced) a sequence of the first length of FRAMES, without noise at 1200x680: 300 frames
-# are 200 MB, the rest 12 MB. Where the second file is missing the program films the sequence, as it does the other
+# are 200 MB, the rest 20 MB. Where the second file is missing the program films the sequence, as it does the other
 # lengths. Both unpacked into an empty folder are all that is needed; so are a checkout and FILE.
 #
 # FRAMES ("300 2000") are the lengths of the sequences, SECONDS_ALLOWED (580) is all the time there is. Results: a
@@ -22,8 +22,8 @@ set -uo pipefail
 cd "$(dirname "$0")/.." || exit 1
 
 mode=${1:-check}
-bundle=${2:-build/gpu_bundle.tar.xz}
-rooms_file=${bundle%.tar.xz}.rooms.tar
+bundle=${2:-build/gpu_bundle.tar.gz}
+rooms_file=${bundle%.tar.gz}.rooms.tar
 out=${OUT:-output/gpu_check}
 build=build/gpu_check
 allowed=${SECONDS_ALLOWED:-580}
@@ -58,7 +58,7 @@ make_bundle() {
   git ls-files scripts/gpu_check.sh cmake/Nvcc.cmake src/splatting src/base src/image/block_formulas.h |
     tar -cf - -T - | tar -xf - -C "$folder" || exit 1
   mkdir -p "$(dirname "$bundle")"
-  XZ_OPT=-6 tar -cJf "$bundle" -C "$folder" . || exit 1
+  tar -czf "$bundle" -C "$folder" . || exit 1
   film build/release/photoslam "$length" "build/gpu_rooms/room-$length" || exit 1
   tar -cf "$rooms_file" -C build/gpu_rooms --transform 's,^,rooms/,' "room-$length" || exit 1
   du -h "$bundle" "$rooms_file"
@@ -236,7 +236,7 @@ find_program() {
   carried=
   if [ -f "$bundle" ]; then
     carried=$build/bundle
-    mkdir -p "$carried" && tar -xJf "$bundle" -C "$carried" || carried=
+    mkdir -p "$carried" && tar -xzf "$bundle" -C "$carried" || carried=
     [ ! -f "$rooms_file" ] || [ -z "$carried" ] || tar -xf "$rooms_file" -C "$carried"
   elif [ -d program ]; then
     carried=.

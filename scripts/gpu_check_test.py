@@ -28,8 +28,8 @@ exit ${BUILD:-0}
 """
 GPU = 'echo "Stand-in, 1.2, 9.0"'
 SANITIZER = 'case $2 in ${BAD_TOOL:-none}) exit 1 ;; esac'
-TOOLS = ("awk bash cat chmod cp cut date dirname env git grep head ls mkdir nproc rm sed setsid sleep tail tar tee timeout tr "
-         "xz").split()
+TOOLS = ("awk bash cat chmod cp cut date dirname env git grep gzip head ls mkdir nproc rm sed setsid sleep tail tar tee "
+         "timeout tr").split()
 
 
 class GpuCheckTest(unittest.TestCase):
