@@ -259,7 +259,7 @@ filming_goes_on() { [ -z "$filming" ] || kill -CONT -- "-$filming" 2>/dev/null; 
 wait_for_room() {
   [ ! -d "$rooms/room-$1" ] || return 0
   filming_goes_on
-  local script='until [ -d "$1" ]; do kill -0 "$2" || exit 1; sleep 1; done'
+  local script='while [ ! -d "$1" ]; do sleep 1; kill -0 "$2" || { [ -d "$1" ] && exit; exit 1; }; done'
   step "film $1 frames" "$2" bash -c "$script" _ "$rooms/room-$1" "$filming"
 }
 

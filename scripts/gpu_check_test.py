@@ -3,8 +3,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What gpu_check.sh reports, with stand-ins for the tools of a machine that has a GPU."""
 
-import os
+import json
+import shutil
 import subprocess
+import tarfile
 import tempfile
 import unittest
 from pathlib import Path
@@ -28,8 +30,24 @@ exit ${BUILD:-0}
 """
 GPU = 'echo "Stand-in, 1.2, 9.0"'
 SANITIZER = 'case $2 in ${BAD_TOOL:-none}) exit 1 ;; esac'
-TOOLS = ("awk bash cat chmod cp cut date dirname env git grep gzip head ls mkdir nproc rm sed setsid sleep tail tar tee "
-         "timeout tr").split()
+# The program of a bundle; `render` writes one value, which on the GPU may be another.
+PROGRAM = """
+command=$1 last="${!#}"
+while [ $# -gt 1 ]; do case $1 in --output) output=$2 ;; --backend) backend=$2 ;; esac; shift; done
+case $command in
+  synth) mkdir -p "$last" ;;
+  run) mkdir -p "$output" && echo "$REPORT" >"$output/report.json" && touch "$output/map.ply" ;;
+  render)
+    value=077
+    [ "$backend" = cpu ] || value=${GPU_VALUE:-077}
+    mkdir -p "$output" && printf '\\223NUMPY\\001\\000\\000\\000\\000\\000\\200\\'"$value" >"$output/0.npy" ;;
+esac
+"""
+REPORT = {"frames": {"tracked": 299, "total": 300}, "image_online": {"psnr_db": 33.5}, "image": {"psnr_db": 34},
+          "mapping": {"iterations": 1000, "ms_per_iteration": 1.5, "gaussians": 100000}, "tracking": {"fps": 60},
+          "ate": {"rmse_m": 0.002}, "memory": {"gpu_mb": 900}, "gpu": {"utilisation": 0.25}, "machine": "stand-in"}
+TOOLS = ("awk bash cat chmod cp cut date dirname env git grep gzip head ls mkdir nice nproc rm sed setsid sleep tail "
+         "tar tee timeout tr").split()
 
 
 class GpuCheckTest(unittest.TestCase):
@@ -41,19 +59,36 @@ class GpuCheckTest(unittest.TestCase):
         (self.folder / "bin").mkdir()
         (self.folder / "scripts" / "gpu_check.sh").write_bytes(SCRIPT.read_bytes())
         for tool in TOOLS:
-            path = subprocess.run(["which", tool], check=True, capture_output=True, text=True).stdout.strip()
-            (self.folder / "bin" / tool).symlink_to(path)
+            self.link_tool(tool)
         self.add_tool("cmake", CMAKE)
+
+    def link_tool(self, name):
+        (self.folder / "bin" / name).symlink_to(shutil.which(name))
 
     def add_tool(self, name, script):
         path = self.folder / "bin" / name
         path.write_text(f"#!/usr/bin/env bash\n{script}\n", encoding="utf-8")
         path.chmod(0o755)
 
+    def add_everything(self):
+        """A GPU, all tools, and a bundle."""
+        self.add_tool("nvidia-smi", GPU)
+        self.add_tool("nvcc", "true")
+        self.add_tool("compute-sanitizer", SANITIZER)
+        self.link_tool("python3")
+        self.link_tool("touch")
+        self.add_tool("photoslam", PROGRAM)
+        self.add_tool("splatting_test", 'echo "[       ${GPU_TEST:-OK} ] Gpu.OfThisMachineTrainsAsTheCpuDoes"')
+        (self.folder / "build").mkdir()
+        with tarfile.open(self.folder / "build" / "gpu_bundle.tar.gz", "w:gz") as bundle:
+            for name in ("photoslam", "splatting_test"):
+                bundle.add(self.folder / "bin" / name, f"program/{name}")
+
     def start(self, **variables):
         return subprocess.Popen(["bash", "scripts/gpu_check.sh"], cwd=self.folder, stdout=subprocess.PIPE,
                                 stderr=subprocess.STDOUT, text=True,
-                                env={"PATH": str(self.folder / "bin"), "CUDA_HOME": str(self.folder), **variables})
+                                env={"PATH": str(self.folder / "bin"), "CUDA_HOME": str(self.folder),
+                                     "REPORT": json.dumps(REPORT), **variables})
 
     def report_of(self, process):
         """Its exit status and what it has written."""
@@ -64,6 +99,31 @@ class GpuCheckTest(unittest.TestCase):
 
     def check(self, **variables):
         return self.report_of(self.start(**variables))
+
+    def test_everything_passes(self):
+        self.add_everything()
+        status, report = self.check()
+        self.assertEqual(status, 0, report)
+        steps = [line.split("|")[1].strip() for line in report.splitlines() if "| passed |" in line]
+        self.assertEqual(steps, [
+            "build", "tests on the GPU", "memcheck", "bench of the engine", "doctor", "steps equal those of the CPU",
+            "run, 300 frames", "export", "bench on cuda", "render on cuda", "bench on cpu", "render on cpu",
+            "images equal those of the CPU", "racecheck", "initcheck", "synccheck", "run, 2000 frames"])
+        self.assertIn("GPU memory 900 MB, GPU busy 25 %", report)
+        self.assertIn("17 passed, 0 failed, 0 not checked", report)
+
+    def test_other_images_and_a_program_without_the_gpu_are_failures(self):
+        self.add_everything()
+        status, report = self.check(GPU_VALUE="100", GPU_TEST="SKIPPED", FRAMES="300")
+        self.assertEqual(status, 1)
+        self.assertIn("FAILED: steps equal those of the CPU; images equal those of the CPU.", report)
+
+    def test_without_python_images_are_not_compared(self):
+        self.add_everything()
+        (self.folder / "bin" / "python3").unlink()
+        status, report = self.check(FRAMES="300")
+        self.assertEqual(status, 3)
+        self.assertIn("| images equal those of the CPU | not checked (there is no python3) |", report)
 
     def test_a_tool_that_is_missing_is_not_checked(self):
         self.add_tool("nvidia-smi", GPU)
