@@ -81,7 +81,8 @@ unchecked() {
 }
 
 # step NAME SECONDS COMMAND...: runs it with a time limit, its output in a log; a row of the report says what came of
-# it. A command that ends with 77 could not check anything; its last line says why.
+# it. A command that ends with 77 could not check anything; its last line says why. The program goes on without a GPU
+# that fails; here that is a failure.
 step() {
   local name=$1 limit=$2 start=$SECONDS left=$((allowed - SECONDS)) log code=0 state
   shift 2
@@ -92,9 +93,11 @@ step() {
   child=$!
   wait "$child" 2>/dev/null || code=$?
   child=
+  [ "$code" != 0 ] || ! grep -q 'the GPU has failed' "$log" || code=gpu
   case $code in
     0) state=passed passed=$((passed + 1)) ;;
     77) unchecked "$name" "$(tail -n 1 "$log")" && return 1 ;;
+    gpu) state="FAILED (the GPU has failed)" ;;
     124 | 137) state="FAILED (stopped after $limit s)" ;;
     *) state="FAILED ($code)" ;;
   esac

@@ -36,7 +36,9 @@ command=$1 last="${!#}"
 while [ $# -gt 1 ]; do case $1 in --output) output=$2 ;; --backend) backend=$2 ;; esac; shift; done
 case $command in
   synth) mkdir -p "$last" ;;
-  run) mkdir -p "$output" && echo "$REPORT" >"$output/report.json" && touch "$output/map.ply" ;;
+  run)
+    echo "$NOTE"
+    mkdir -p "$output" && echo "$REPORT" >"$output/report.json" && touch "$output/map.ply" ;;
   render)
     value=077
     [ "$backend" = cpu ] || value=${GPU_VALUE:-077}
@@ -117,6 +119,12 @@ class GpuCheckTest(unittest.TestCase):
         status, report = self.check(GPU_VALUE="100", GPU_TEST="SKIPPED", FRAMES="300")
         self.assertEqual(status, 1)
         self.assertIn("FAILED: steps equal those of the CPU; images equal those of the CPU.", report)
+
+    def test_a_gpu_that_fails_on_the_way_is_a_failure(self):
+        self.add_everything()
+        status, report = self.check(NOTE="  note: the GPU has failed (unspecified launch failure)", FRAMES="300")
+        self.assertEqual(status, 1)
+        self.assertIn("| run, 300 frames | FAILED (the GPU has failed) |", report)
 
     def test_without_python_images_are_not_compared(self):
         self.add_everything()
