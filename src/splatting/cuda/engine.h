@@ -37,6 +37,7 @@ class Engine final : public DeviceEngine {
 
   void arrange(const Arrangement& arrangement) override;
   void fetch(int first_row, int num_rows, float* rows) override {
+    if (num_blocks_ == 0) return;
     device_.download_rows(rows, &blocks_.data()->parameters[0][0] + first_row * kBlockSize, sizeof(Block),
                           static_cast<size_t>(num_rows) * sizeof(float) * kBlockSize, num_blocks_);
   }

@@ -464,13 +464,13 @@ TEST(CudaEngine, ThereIsALimitToTheInstancesWhateverTheMemory) {
   Scene scene;
   scene.count = 80;
   scene.log_scale_max = -0.3;
-  scene.width = 150;
-  scene.height = 100;
+  scene.width = 64;
+  scene.height = 48;
   scene.build(25);
   const Lesson lesson(scene);
   OnDevice all(scene);
   all.draw();
-  for (const uint32_t most : {700u, all.figures.instances - 1}) {
+  for (const uint32_t most : {200u, all.figures.instances - 1}) {
     OnDevice some(scene, kPlenty, TestDevice(), most);
     const Figures figures = some.engine.step(some.view, lesson.target, lesson.loss, lesson.constants, true);
     EXPECT_EQ(figures.instances, most);
