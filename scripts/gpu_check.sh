@@ -4,84 +4,128 @@
 #
 # Everything that only a GPU can show, in one run of at most ten minutes on a machine without network or packages:
 # builds src/splatting/standalone with nvcc and cmake, runs its tests on the GPU, also under compute-sanitizer, measures
-# the engine, and with a bundle the whole program on the built-in room, which is filmed meanwhile. Where there is no GPU
-# it does the rest, says so, and fails.
+# the engine, and with a bundle the whole program on the built-in room. What matters most comes first. Where there is no
+# GPU it does the rest, says so, and fails.
 #
-#   scripts/gpu_check.sh bundle [FILE]    beforehand, where build/release is: packs the program with its libraries
+#   scripts/gpu_check.sh bundle [FILE]    beforehand, where build/release is
 #   scripts/gpu_check.sh [check] [FILE]   on the machine with the GPU
 #
-# FILE is build/gpu_bundle.tar.xz by default. FRAMES ("300 2000") are the lengths of the sequences, SECONDS_ALLOWED (600)
-# is all the time there is. Results: a report with the date in its name, and logs, in $OUT or else in output/gpu_check.
+# FILE, build/gpu_bundle.tar.gz by default, holds the program with its libraries and the sources to build there, and
+# FILE.rooms.tar (its ending replaced) a sequence of the first length of FRAMES, without noise at 1200x680: 300 frames
+# are 200 MB, the rest 20 MB. Where the second file is missing the program films the sequence, as it does the other
+# lengths. Both unpacked into an empty folder are all that is needed; so are a checkout and FILE.
+#
+# FRAMES ("300 2000") are the lengths of the sequences, SECONDS_ALLOWED (580) is all the time there is. Results: a
+# report with the date in its name, and logs, in $OUT or else in output/gpu_check.
+# Exit status: 0 all passed; 1 something failed; 2 there is no GPU; 3 none failed, but some could not be checked.
 set -uo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/.." || exit 1
 
 mode=${1:-check}
-bundle=${2:-build/gpu_bundle.tar.xz}
+bundle=${2:-build/gpu_bundle.tar.gz}
+rooms_file=${bundle%.tar.gz}.rooms.tar
 out=${OUT:-output/gpu_check}
 build=build/gpu_check
+allowed=${SECONDS_ALLOWED:-580}
+lengths=${FRAMES:-300 2000}
+
+# film PHOTOSLAM FRAMES FOLDER: which exists only when it is complete.
+film() {
+  [ -d "$3" ] || "$1" synth room --frames "$2" --size 1200x680 --noise 0 --depth-noise 0 --output "$3"
+}
+
+# --- Beforehand ---
+
+# The C and C++ libraries of the other machine serve, if they are as new: they also have to serve what nvcc builds.
+pack_program() {
+  mkdir -p "$1/lib"
+  for program in build/release/photoslam build/release/src/splatting_test; do
+    [ -x "$program" ] || { echo "gpu_check: $program is missing; run: make test" >&2 && return 1; }
+    strip -o "$1/$(basename "$program")" "$program"
+    ldd "$program" | awk '$3 ~ "^/" {print $3}' | grep -vE '/(libc|libm|libstdc\+\+|libgcc_s)\.so' |
+      while read -r library; do cp -L "$library" "$1/lib/"; done
+  done
+  # Should nvcc fail there.
+  [ ! -f build/release/photoslam_cuda.so ] || cp build/release/photoslam_cuda.so "$1/"
+}
 
 make_bundle() {
-  local folder
+  local length=${lengths%% *}
   folder=$(mktemp -d) || exit 1
   trap 'rm -rf "$folder"' EXIT
-  mkdir -p "$folder/lib"
-  for program in build/release/photoslam build/release/src/splatting_test; do
-    [ -x "$program" ] || { echo "gpu_check: $program is missing; run: make test" >&2; exit 1; }
-    strip -o "$folder/$(basename "$program")" "$program"
-    # The C and C++ libraries of the other machine serve, if they are as new: they also have to serve what nvcc builds.
-    ldd "$program" | awk '$3 ~ "^/" {print $3}' | grep -vE '/(libc|libm|libstdc\+\+|libgcc_s)\.so' |
-      while read -r library; do cp -L "$library" "$folder/lib/"; done
-  done
+  pack_program "$folder/program" || exit 1
+  git rev-parse --short HEAD >"$folder/revision"
+  git ls-files scripts/gpu_check.sh cmake/Nvcc.cmake src/splatting src/base src/image/block_formulas.h |
+    tar -cf - -T - | tar -xf - -C "$folder" || exit 1
   mkdir -p "$(dirname "$bundle")"
-  XZ_OPT=-2 tar -cJf "$bundle" -C "$folder" . || exit 1
-  echo "gpu_check: $bundle, $(du -h "$bundle" | cut -f1)"
-  exit 0
+  tar -czf "$bundle" -C "$folder" . || exit 1
+  film build/release/photoslam "$length" "build/gpu_rooms/room-$length" || exit 1
+  tar -cf "$rooms_file" -C build/gpu_rooms --transform 's,^,rooms/,' "room-$length" || exit 1
+  du -h "$bundle" "$rooms_file"
 }
-case $mode in
-  bundle) make_bundle ;;
-  check) ;;
-  *) echo "gpu_check: $mode is neither bundle nor check" >&2 && exit 1 ;;
-esac
 
-mkdir -p "$out" "$build"
-report=$out/gpu-$(date -u +%Y-%m-%d).md
-allowed=${SECONDS_ALLOWED:-600}
-lengths=${FRAMES:-300 2000}
-failed=0
+# --- The report ---
 
 note() { echo "$*" | tee -a "$report"; }
 
-# step NAME SECONDS COMMAND...: runs it with a time limit, its output in a log; a row of the report says what came of it.
-step() {
-  local name=$1 limit=$2 start=$SECONDS left=$((allowed - SECONDS - 5)) log state
-  shift 2
-  [ "$limit" -lt $left ] || limit=$left
-  if [ "$limit" -lt 1 ]; then
-    note "| $name | FAILED (no time left) | |"
-    failed=1
-    return 1
-  fi
-  log=$out/$(tr -d ',' <<<"$name" | tr ' ' _).log
-  if timeout "$limit" "$@" >"$log" 2>&1; then state=passed; else state="FAILED ($?)" failed=1; fi
-  note "| $name | $state | $((SECONDS - start)) s |"
-  if [ "$state" != passed ]; then tail -n 15 "$log"; fi
-  [ "$state" = passed ]
+join() {
+  local all
+  all=$(printf '; %s' "$@")
+  echo "${all:2}"
 }
 
-jobs=$(nproc)
-gpu=$(nvidia-smi --query-gpu=name,driver_version,compute_cap --format=csv,noheader 2>/dev/null | head -n 1)
-capability=$(sed 's/.*, *//; s/\.//' <<<"$gpu")
-: >"$report"
-note "# GPU check, $(date -u +%Y-%m-%d)"
-note ""
-note "GPU: ${gpu:-none}. Processor: $(sed -n 's/^model name.*: //p' /proc/cpuinfo | head -n 1), $jobs threads. nvcc: $( (command -v nvcc >/dev/null && nvcc --version || /usr/local/cuda/bin/nvcc --version) 2>/dev/null | sed -n 's/.*release \([0-9.]*\).*/\1/p'). Revision: $(git rev-parse --short HEAD 2>/dev/null || echo unknown)."
-note ""
-note "| step | result | time |"
-note "|---|---|---|"
+# A row about something that could not be checked, and why.
+unchecked() {
+  note "| $1 | not checked ($2) | |"
+  missing+=("$1")
+}
 
-build_engine() {
-  cmake -S src/splatting/standalone -B "$build" -DPHOTOSLAM_CUDA_ARCHITECTURES="${capability:-90}" &&
-    cmake --build "$build" --parallel "$jobs"
+# step NAME SECONDS COMMAND...: runs it with a time limit, its output in a log; a row of the report says what came of
+# it. A command that ends with 77 could not check anything; its last line says why. The program goes on without a GPU
+# that fails; here that is a failure.
+step() {
+  local name=$1 limit=$2 start=$SECONDS left=$((allowed - SECONDS)) log code=0 state
+  shift 2
+  [ "$left" -ge 3 ] || { unchecked "$name" "no time left" && return 1; }
+  [ "$limit" -lt "$left" ] || limit=$left
+  log=$out/$(tr -d ',' <<<"$name" | tr ' ' _).log
+  timeout --kill-after=5 "$limit" "$@" >"$log" 2>&1 &
+  child=$!
+  wait "$child" 2>/dev/null || code=$?
+  child=
+  [ "$code" != 0 ] || ! grep -q 'the GPU has failed' "$log" || code=gpu
+  case $code in
+    0) state=passed passed=$((passed + 1)) ;;
+    77) unchecked "$name" "$(tail -n 1 "$log")" && return 1 ;;
+    gpu) state="FAILED (the GPU has failed)" ;;
+    124 | 137) state="FAILED (stopped after $limit s)" ;;
+    *) state="FAILED ($code)" ;;
+  esac
+  note "| $name | $state | $((SECONDS - start)) s |"
+  [ "$code" != 0 ] || return 0
+  failures+=("$name")
+  tail -n 15 "$log"
+  return 1
+}
+
+# The end of the report, however the run ends.
+finish() {
+  trap - EXIT INT TERM
+  [ -z "$child" ] || kill "$child"
+  [ -z "$filming" ] || { kill -TERM -- "-$filming" && kill -CONT -- "-$filming"; } 2>/dev/null
+  note ""
+  note "Aims of the program (H200): online PSNR 33 dB on 300 frames and 36 dB on 2000, at most 2000 MB of GPU memory."
+  note "In $SECONDS s: $passed passed, ${#failures[@]} failed, ${#missing[@]} not checked."
+  [ ${#failures[@]} = 0 ] || note "FAILED: $(join "${failures[@]}")."
+  [ ${#missing[@]} = 0 ] || note "Not checked: $(join "${missing[@]}")."
+  [ "$ended" = yes ] || note "The run was stopped before its end."
+  if [ -z "$gpu" ]; then
+    note "No GPU was found: nothing above says anything about one."
+    exit 2
+  fi
+  [ ${#failures[@]} = 0 ] && [ "$ended" = yes ] || exit 1
+  [ ${#missing[@]} = 0 ] || exit 3
+  exit 0
 }
 
 # Figures of the program: one line of the report from a report.json.
@@ -93,18 +137,20 @@ import sys
 
 report = json.load(open(sys.argv[1], encoding="utf-8"))
 get = lambda group, key: report[group][key] if report[group][key] is not None else float("nan")
-print(f"{report['frames']['tracked']} of {report['frames']['total']} frames, online PSNR {get('image_online', 'psnr_db'):.2f} dB, "
+gpu = f"GPU memory {get('memory', 'gpu_mb'):.0f} MB, GPU busy {100 * get('gpu', 'utilisation'):.0f} %; "
+print(f"{report['frames']['tracked']} of {report['frames']['total']} frames, "
+      f"online PSNR {get('image_online', 'psnr_db'):.2f} dB, "
       f"refined {get('image', 'psnr_db'):.2f} dB, {report['mapping']['iterations']} iterations of "
       f"{get('mapping', 'ms_per_iteration'):.2f} ms, {report['mapping']['gaussians']} gaussians, tracking "
-      f"{get('tracking', 'fps'):.0f} frames/s, ATE {100 * get('ate', 'rmse_m'):.2f} cm, GPU memory "
-      f"{get('memory', 'gpu_mb'):.0f} MB; {report['machine']}")
+      f"{get('tracking', 'fps'):.0f} frames/s, ATE {100 * get('ate', 'rmse_m'):.2f} cm; "
+      f"{gpu if report['memory']['gpu_mb'] is not None else ''}{report['machine']}")
 PYTHON
 }
 
 # compare_images A B: renders as .npy of both backends; the largest difference must be small, but for the few pixels
 # where rounding decides whether a splat counts.
 compare_images() {
-  command -v python3 >/dev/null || { echo "not compared: there is no python3" && return; }
+  command -v python3 >/dev/null || { echo "there is no python3" && return 77; }
   python3 - "$@" <<'PYTHON'
 import array
 import pathlib
@@ -125,113 +171,186 @@ sys.exit(count == 0 or beyond > 1e-4 * total)
 PYTHON
 }
 
-film_rooms() {
-  for frames in $lengths; do
-    [ -f "$build/room-$frames/done" ] && continue
-    rm -rf "$build/room-$frames"
-    "$program/photoslam" synth room --frames "$frames" --size 1200x680 --output "$build/room-$frames" || return 1
-    touch "$build/room-$frames/done"
-  done
+# --- The engine, for which nvcc, cmake and this folder are enough ---
+
+find_gpu() {
+  gpu=$(nvidia-smi --query-gpu=name,driver_version,compute_cap --format=csv,noheader 2>/dev/null | sed -n 1p) || gpu=
+  [ -n "$gpu" ] || [ ! -e /dev/nvidiactl ] || gpu="unknown, there is no nvidia-smi"
+  capability=$(sed -n 's/.*, *\([0-9]*\)\.\([0-9]*\)$/\1\2/p' <<<"$gpu")
+  capability=${capability:-90}
 }
 
-# run_room FRAMES REFINE_SECONDS: the program at 1200x680, as fast as tracking goes.
+build_engine() {
+  local configure=(cmake -S src/splatting/standalone -B "$build/engine" -DPHOTOSLAM_CUDA_ARCHITECTURES="$capability")
+  "${configure[@]}" || { rm -rf "$build/engine" && "${configure[@]}"; } || return 1
+  cmake --build "$build/engine" --parallel "$jobs"
+}
+
+describe_machine() {
+  note "# GPU check, $(date -u +%Y-%m-%d)"
+  note ""
+  note "GPU: ${gpu:-none}. Processor: $(sed -n 's/^model name.*: //p' /proc/cpuinfo | sed -n 1p), $jobs threads." \
+    "nvcc: $(nvcc --version 2>/dev/null | sed -n 's/.*release \([0-9.]*\).*/\1/p')." \
+    "Revision: $(cat revision 2>/dev/null || git rev-parse --short HEAD 2>/dev/null || echo unknown)."
+  note ""
+  note "| step | result | time |"
+  note "|---|---|---|"
+}
+
+# sanitize TOOL ARGUMENT...: under compute-sanitizer, where there is one.
+sanitize() {
+  local tool=$1
+  shift
+  if [ -z "$sanitizer" ]; then
+    unchecked "$tool" "there is no compute-sanitizer"
+  elif [ ! -x "$engine/engine_device_test" ]; then
+    unchecked "$tool" "the tests were not built"
+  else
+    step "$tool" 80 "$sanitizer" --tool "$tool" --error-exitcode 1 "$@"
+  fi
+}
+
+check_engine() {
+  step "build" 200 bash -c build_engine
+  if [ -z "$gpu" ]; then
+    step "tests on the host" 200 "$engine/engine_host_test"
+    return
+  fi
+  if [ -x "$engine/engine_device_test" ]; then
+    step "tests on the GPU" 90 "$engine/engine_device_test"
+  else
+    unchecked "tests on the GPU" "they were not built: is there an nvcc?"
+  fi
+  sanitize memcheck --leak-check full "$engine/engine_device_test"
+}
+
+# With nothing else running.
+measure_engine() {
+  [ -n "$gpu" ] || return
+  [ -x "$engine/engine_bench" ] || { unchecked "bench of the engine" "it was not built" && return; }
+  step "bench of the engine" 40 "$engine/engine_bench" &&
+    note "| \`$(tr -d '\n' <"$out/bench_of_the_engine.log")\`" \
+      "(aims on an H200: 1.4 ms per step, 0.5 ms per frame) | | |"
+}
+
+# --- The program, from the bundle ---
+
+find_program() {
+  carried=
+  if [ -f "$bundle" ]; then
+    carried=$build/bundle
+    mkdir -p "$carried" && tar -xzf "$bundle" -C "$carried" || carried=
+    [ ! -f "$rooms_file" ] || [ -z "$carried" ] || tar -xf "$rooms_file" -C "$carried"
+  elif [ -d program ]; then
+    carried=.
+  fi
+  rooms=${carried:-.}/rooms
+  program=(env "LD_LIBRARY_PATH=$PWD/$carried/program/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}")
+  program+=("$PWD/$carried/program/photoslam")
+}
+
+# Films what the bundle does not hold, in the background and in a process group of its own.
+start_filming() {
+  local script='for frames in $lengths; do film "$1" "$frames" "$rooms/room-$frames" || exit 1; done'
+  LD_LIBRARY_PATH="$PWD/$carried/program/lib" setsid nice bash -c "$script" _ "${program[2]}" >"$out/film.log" 2>&1 &
+  filming=$!
+}
+filming_pauses() { [ -z "$filming" ] || kill -STOP -- "-$filming" 2>/dev/null; }
+filming_goes_on() { [ -z "$filming" ] || kill -CONT -- "-$filming" 2>/dev/null; }
+
+# wait_for_room FRAMES SECONDS
+wait_for_room() {
+  [ ! -d "$rooms/room-$1" ] || return 0
+  filming_goes_on
+  local script='while [ ! -d "$1" ]; do sleep 1; kill -0 "$2" || { [ -d "$1" ] && exit; exit 1; }; done'
+  step "film $1 frames" "$2" bash -c "$script" _ "$rooms/room-$1" "$filming"
+}
+
+# run_room FRAMES REFINE_SECONDS LIMIT: the program, as fast as tracking goes.
 run_room() {
-  local room=$build/room-$1
-  [ -f "$room/done" ] || return 1
-  step "run, $1 frames" 300 "$program/photoslam" run "$room" --backend "$backend" --pace asap --refine-seconds "$2" \
-    --output "$out/run-$1" --no-session || return 1
+  wait_for_room "$1" "$3" || { unchecked "run, $1 frames" "they were not filmed" && return 1; }
+  filming_pauses
+  rm -rf "$out/run-$1"
+  step "run, $1 frames" "$3" "${program[@]}" run "$rooms/room-$1" --backend "$backend" --pace asap \
+    --refine-seconds "$2" --output "$out/run-$1" --no-session || return 1
   note "| $(figures "$out/run-$1/report.json") | | |"
 }
 
 # compare_backends FRAMES: what the CPU and the GPU draw of the map of a run, and how fast they train it.
 compare_backends() {
-  local run=$out/run-$1 backends=cpu
-  [ -z "$gpu" ] || backends="cpu cuda"
-  step "export" 60 "$program/photoslam" export "$run" --to transforms --output "$build/transforms" || return 1
-  for backend in $backends; do
-    step "bench on $backend" 100 "$program/photoslam" bench splat --model "$run/map.ply" --backend "$backend" \
+  local run=$out/run-$1 backends=cpu on
+  [ -z "$gpu" ] || backends="cuda cpu"
+  rm -rf "$build"/{transforms,render-cpu,render-cuda}
+  step "export" 30 "${program[@]}" export "$run" --to transforms --output "$build/transforms" || return 1
+  for on in $backends; do
+    step "bench on $on" 60 "${program[@]}" bench splat --model "$run/map.ply" --backend "$on" \
       --cameras "$build/transforms/transforms.json" --rounds 1 --json
-    step "render on $backend" 60 "$program/photoslam" render "$run" --orbit --orbit-frames 6 --backend "$backend" \
-      --format npy --output "$build/render-$backend"
+    step "render on $on" 30 "${program[@]}" render "$run" --orbit --orbit-frames 6 --backend "$on" \
+      --format npy --output "$build/render-$on"
   done
   [ -n "$gpu" ] || return 0
-  step "images equal those of the CPU" 60 bash -c 'compare_images "$@"' _ "$build/render-cpu" "$build/render-cuda" &&
+  step "images equal those of the CPU" 30 bash -c 'compare_images "$@"' _ "$build/render-cpu" "$build/render-cuda" &&
     note "| $(cat "$out/images_equal_those_of_the_CPU.log") | | |"
 }
 
-sanitize() {
-  local tool=$1
-  shift
-  step "$tool" 80 "$sanitizer" --tool "$tool" --error-exitcode 1 "$@"
+# The tests of the program against the GPU it finds; finding none is a failure.
+steps_equal() {
+  local log code=0
+  log=$("$@" --gtest_filter='Gpu.OfThisMachine*' 2>&1) || code=$?
+  echo "$log"
+  [ "$code" = 0 ] && grep -q ' OK ' <<<"$log"
 }
 
-# --- What needs the engine only ---
+check_program() {
+  [ ! -f "$engine/photoslam_cuda.so" ] || cp "$engine/photoslam_cuda.so" "$carried/program/"
+  step "doctor" 20 "${program[@]}" doctor
+  [ -z "$gpu" ] || step "steps equal those of the CPU" 40 bash -c 'steps_equal "$@"' _ "${program[@]:0:2}" \
+    "$PWD/$carried/program/splatting_test"
+  local limit=100
+  [ -n "$gpu" ] || limit=300
+  run_room "$first" 5 "$limit" && compare_backends "$first"
+}
 
-program=$build/program backend=${gpu:+cuda}
-backend=${backend:-cpu}
-export -f compare_images build_engine film_rooms
-export build gpu capability jobs program lengths
-filming=
-if [ -f "$bundle" ]; then
-  mkdir -p "$program" && tar -xJf "$bundle" -C "$program" || exit 1
-  export LD_LIBRARY_PATH=$PWD/$program/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
-  nice timeout "$allowed" bash -c film_rooms >"$out/film.log" 2>&1 &
-  filming=$!
-fi
-step "build" 300 bash -c build_engine || exit 1
-if [ -z "$gpu" ]; then
-  step "tests on the host" 240 "$build/engine_host_test"
-else
-  step "tests on the GPU" 120 "$build/engine_device_test"
-  sanitizer=$(command -v compute-sanitizer || ls /usr/local/cuda/bin/compute-sanitizer 2>/dev/null)
-  if [ -n "$sanitizer" ]; then
-    sanitize memcheck --leak-check full "$build/engine_device_test"
-    sanitize racecheck "$build/engine_device_test" Sort Prefix Loss StepIsAdam Images Smaller
-    sanitize initcheck "$build/engine_device_test" Sort Prefix Loss StepIsAdam Arrange Fates Smaller
-    sanitize synccheck "$build/engine_device_test" Sort Prefix Loss StepIsAdam Images Smaller
-  else
-    note "| compute-sanitizer | not there | |"
-  fi
-fi
-
-# --- What is measured: with nothing else running ---
-
-if [ -n "$filming" ]; then
-  step "film the room" 300 tail --pid="$filming" -f /dev/null
-  wait "$filming" || {
-    note "| filming FAILED: see film.log | | |"
-    failed=1
-  }
-fi
-if [ -n "$gpu" ]; then
-  step "bench of the engine" 60 "$build/engine_bench" &&
-    note "| \`$(tr -d '\n' <"$out/bench_of_the_engine.log")\` (aims on an H200: 1.4 ms per step, 0.5 ms per frame) | | |"
-fi
-if [ -n "$filming" ]; then
-  [ ! -f "$build/photoslam_cuda.so" ] || cp "$build/photoslam_cuda.so" "$program/"
-  step "doctor" 30 "$program/photoslam" doctor
+check() {
+  check_engine
+  filming_pauses
+  measure_engine
+  if [ -n "$carried" ]; then check_program; else unchecked program "there is no $bundle"; fi
+  filming_goes_on
   if [ -n "$gpu" ]; then
-    step "steps equal those of the CPU" 60 "$program/splatting_test" --gtest_filter='Gpu.OfThisMachine*'
-    if grep -q SKIPPED "$out/steps_equal_those_of_the_CPU.log"; then
-      note "| FAILED: the module found no GPU | | |"
-      failed=1
-    fi
+    sanitize racecheck "$engine/engine_device_test" Sort Prefix Loss StepIsAdam Images Smaller
+    sanitize initcheck "$engine/engine_device_test" Sort Prefix Loss StepIsAdam Arrange Fates Smaller
+    sanitize synccheck "$engine/engine_device_test" Sort Prefix Loss StepIsAdam Images Smaller
   fi
-  first=${lengths%% *} refine=5
+  [ -n "$carried" ] || return
   for frames in $lengths; do
-    run_room "$frames" $refine
-    refine=0
+    [ "$frames" = "$first" ] || run_room "$frames" 0 300
   done
-  [ ! -f "$out/run-$first/map.ply" ] || compare_backends "$first"
-else
-  note "| program | no $bundle: see scripts/gpu_check.sh | |"
-fi
+}
 
-note ""
-note "Aims of the program (H200): online PSNR 33 dB on 300 frames and 36 dB on 2000, at most 2000 MB of GPU memory."
-note "$([ $failed = 0 ] && echo "All passed" || echo "Something failed") in $SECONDS s."
-if [ -z "$gpu" ]; then
-  note "No GPU was found: nothing above says anything about one."
-  exit 2
-fi
-exit $failed
+case $mode in
+  bundle) make_bundle && exit 0 ;;
+  check) ;;
+  *) echo "gpu_check: $mode is neither bundle nor check" >&2 && exit 1 ;;
+esac
+mkdir -p "$out" "$build" || exit 1
+report=$out/gpu-$(date -u +%Y-%m-%d).md
+: >"$report" || exit 1
+passed=0 failures=() missing=() child='' filming='' ended=no gpu=''
+first=${lengths%% *}
+engine=$build/engine
+jobs=$(nproc)
+cuda=${CUDA_HOME:-/usr/local/cuda}
+PATH=$PATH:$cuda/bin
+trap finish EXIT
+trap 'exit 1' INT TERM
+find_gpu
+backend=${gpu:+cuda} backend=${backend:-cpu}
+describe_machine
+sanitizer=$(command -v compute-sanitizer || ls "$cuda/compute-sanitizer/compute-sanitizer" 2>/dev/null)
+find_program
+export -f film build_engine compare_images steps_equal
+export build capability jobs lengths rooms
+[ -z "$carried" ] || start_filming
+check
+ended=yes

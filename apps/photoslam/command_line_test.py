@@ -151,6 +151,7 @@ class BackendTest(CommandLineTest):
         self.assertIn("splatting on the GPU" if has_gpu else "splatting on the CPU (no GPU", result.stderr)
         report = json.loads((self.output / "report.json").read_text(encoding="utf-8"))
         self.assertEqual(report["memory"]["gpu_mb"] is not None, has_gpu)
+        self.assertEqual(report["gpu"]["utilisation"] is not None, has_gpu)
 
 
 class ConfigTest(CommandLineTest):
@@ -313,8 +314,8 @@ class RunTest(CommandLineTest):
                         "seconds_drain", "seconds_refine"],
             "ate": ate, "ate_online": ate, "rpe": ["trans_m", "rot_deg"],
             "image_online": image, "image": image, "image_keyframes": image, "image_held_out": image,
-            "render": ["fps"], "memory": ["peak_rss_mb", "gpu_mb"], "map": ["size_mb"],
-            "loops": ["closed", "reconnected"], "config": ["all", "changed"],
+            "render": ["fps"], "memory": ["peak_rss_mb", "gpu_mb"],
+            "gpu": ["utilisation"], "map": ["size_mb"], "loops": ["closed", "reconnected"], "config": ["all", "changed"],
         }
         for group, keys in contract.items():
             for key in keys:

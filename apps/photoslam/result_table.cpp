@@ -63,6 +63,10 @@ std::string result_table(const Report& report) {
   add_images(table, "  held out", report.image_held_out);
   if (report.render.fps) table.line("rendering", "{:.0f} frames/s on one core", *report.render.fps);
   if (report.memory.peak_rss_mb) table.line("memory", "{:.0f} MB at most", *report.memory.peak_rss_mb);
+  if (report.gpu.utilisation) {
+    table.line("GPU", "{:.0f} MB at most, busy {:.0f} % of the time", report.memory.gpu_mb.value_or(0),
+               100 * *report.gpu.utilisation);
+  }
   if (report.seconds_total) table.line("time", "{:.1f} s", *report.seconds_total);
   return std::move(table).text();
 }

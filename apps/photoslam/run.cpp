@@ -102,13 +102,6 @@ Result<std::unique_ptr<FrameSource>> reopen(const fs::path& path, const SourceOp
   return open_source(path, options);
 }
 
-void describe_gpu_use(const splatting::Gpu& gpu, const RunOutcome& run, Report& report) {
-  const double seconds = run.seconds_online + run.seconds_drain + run.seconds_refine;
-  report.memory.gpu_mb = gpu.peak_mb();
-  report.machine += fmt::format("; GPU {}, busy {:.0f} % of the time", gpu.name(),
-                                100 * gpu.busy_seconds() / std::max(seconds, 1e-9));
-}
-
 /// Trajectories and map are on disk before anything is measured.
 Status save_and_evaluate(const RunArguments& arguments, const SystemOptions& options, const RunSettings& settings,
                          const SourceInfo& info, const RunOutcome& run) {
@@ -134,7 +127,7 @@ Status save_and_evaluate(const RunArguments& arguments, const SystemOptions& opt
   fmt::print(stderr, "measuring\n");
   HtmlReport html = evaluate_run(run, options, **source, truth, !run.interrupted, executor);
   html.report.map.size_mb = 1e-6 * static_cast<double>(map_bytes);
-  if (settings.gpu) describe_gpu_use(*settings.gpu, run, html.report);
+  if (settings.gpu) html.report.machine += "; GPU " + settings.gpu->name();
   if (Status status = write_report(arguments.output / "report.json", html.report); !status) return status;
   if (Status status = write_html_report(arguments.output / "report.html", html); !status) return status;
   fmt::print("{}", arguments.json ? to_json(html.report) : result_table(html.report));

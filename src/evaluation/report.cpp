@@ -61,6 +61,7 @@ void visit_keys(Visitor& v, AnyReport& r) {
   visit_image(v, "image_held_out", r.image_held_out);
   v.group("render", [&](auto& g) { g("fps", r.render.fps); });
   v.group("memory", [&](auto& g) { g("peak_rss_mb", r.memory.peak_rss_mb), g("gpu_mb", r.memory.gpu_mb); });
+  v.group("gpu", [&](auto& g) { g("utilisation", r.gpu.utilisation); });
   v.group("map", [&](auto& g) { g("size_mb", r.map.size_mb); });
   v.group("loops", [&](auto& g) { g("closed", r.loops.closed), g("reconnected", r.loops.reconnected); });
   v("machine", r.machine);

@@ -50,6 +50,9 @@ struct Report {
   struct Memory {
     Figure peak_rss_mb, gpu_mb;
   };
+  struct Gpu {
+    Figure utilisation;  ///< Time the GPU drew and trained over the time the photorealistic mapping took, 0 to 1.
+  };
   struct MapSize {
     Figure size_mb;
   };
@@ -73,6 +76,7 @@ struct Report {
   ImageFigures image_held_out;
   Render render;
   Memory memory;
+  Gpu gpu;
   MapSize map;
   Loops loops;
   std::string machine;

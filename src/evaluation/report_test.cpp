@@ -48,7 +48,8 @@ TEST_F(ReportTest, HasExactlyTheKeysOfTheContract) {
             "image_keyframes.psnr_db image_keyframes.psnr_p5_db image_keyframes.ssim image_keyframes.lpips "
             "image_keyframes.frames image_held_out.psnr_db image_held_out.psnr_p5_db image_held_out.ssim "
             "image_held_out.lpips image_held_out.frames "
-            "render.fps memory.peak_rss_mb memory.gpu_mb map.size_mb loops.closed loops.reconnected "
+            "render.fps memory.peak_rss_mb memory.gpu_mb gpu.utilisation map.size_mb "
+            "loops.closed loops.reconnected "
             "machine version config.all config.changed ");
 }
 
@@ -74,6 +75,7 @@ TEST_F(ReportTest, ReadsWhatItWrote) {
   report.rpe = to_report(RelativeError{0.02, 0.3, 7});
   report.image.ssim = 0.875;
   report.image.frames = 500;
+  report.gpu.utilisation = 0.625;
   report.machine = "two cores";
   report.version = "0.1.0";
   report.config.all = {{"a.switch", true}, {"a.count", 3}, {"b.ratio", 0.5}, {"b.name", std::string("x \"y\"")}};
@@ -82,6 +84,7 @@ TEST_F(ReportTest, ReadsWhatItWrote) {
   const Report back = read_report(folder / "report.json").value();
   EXPECT_EQ(to_json(back), to_json(report));
   EXPECT_EQ(back.ate.matched, 499);
+  EXPECT_EQ(back.gpu.utilisation, 0.625);
   EXPECT_EQ(back.config.all[2].value, ConfigValue(0.5));
   EXPECT_FALSE(back.latency.p50_ms.has_value());
   EXPECT_FALSE(to_report(std::optional<AbsoluteError>()).rmse_m.has_value());

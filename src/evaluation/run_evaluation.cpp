@@ -73,10 +73,11 @@ void add_mapping_figures(const RunOutcome& run, Report& report) {
   report.seconds_total = run.seconds_total;
   report.loops.closed = run.loops_closed;
   report.loops.reconnected = run.loops_reconnected;
-  if (run.iterations > 0) {
-    report.mapping.ms_per_iteration =
-        1e3 * (run.seconds_online + run.seconds_drain + run.seconds_refine) / run.iterations;
-  }
+  const double seconds = run.seconds_online + run.seconds_drain + run.seconds_refine;
+  if (run.iterations > 0) report.mapping.ms_per_iteration = 1e3 * seconds / run.iterations;
+  if (!run.gpu) return;
+  report.memory.gpu_mb = run.gpu->peak_mb;
+  if (seconds > 0) report.gpu.utilisation = run.gpu->busy_seconds / seconds;
 }
 
 void add_image_figures(const RunOutcome& run, FrameSource& source, Executor& executor, HtmlReport& html) {

@@ -71,6 +71,12 @@ struct RefinementPoint {
   size_t gaussians = 0;
 };
 
+/// What a run took of its GPU; see splatting::Gpu.
+struct GpuUse {
+  double peak_mb = 0;
+  double busy_seconds = 0;
+};
+
 struct RunOutcome {
   std::vector<FrameOutcome> frames;  ///< Every input frame, in order.
   FrozenMap online;                  ///< When all keyframes were consumed, at most 1 s after the last frame.
@@ -80,6 +86,7 @@ struct RunOutcome {
   int loops_reconnected = 0;  ///< Times that tracking itself came back to an old part of the map.
   double mapping_cpu_seconds = 0;
   double seconds_online = 0, seconds_drain = 0, seconds_refine = 0, seconds_total = 0;
+  std::optional<GpuUse> gpu;  ///< Nothing: there was none.
   std::vector<RefinementPoint> refinement;
   std::vector<int> component_of_keyframe;  ///< [K] See connected_components(); empty: all are connected.
   bool interrupted = false;                ///< Stopped from outside before the input ended.

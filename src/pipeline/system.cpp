@@ -19,6 +19,7 @@
 #include "pipeline/mapping_worker.h"
 #include "pipeline/session_file.h"
 #include "pipeline/stage.h"
+#include "splatting/gpu.h"
 
 namespace photoslam {
 namespace {
@@ -442,6 +443,7 @@ void Session::refine(const std::function<void(const Progress&)>& on_progress) {
 }
 
 RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress) {
+  const double busy_before = settings_.gpu ? settings_.gpu->busy_seconds() : 0;
   if (!threaded_) {
     localize_all([&] {
       save_if_due();
@@ -486,6 +488,7 @@ RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress)
   outcome_.loops_reconnected = loop_closer_.num_reconnected();
   outcome_.mapping_cpu_seconds = mapping_.cpu_seconds;
   outcome_.seconds_total = clock_.seconds();
+  if (settings_.gpu) outcome_.gpu = GpuUse{settings_.gpu->peak_mb(), settings_.gpu->busy_seconds() - busy_before};
   outcome_.interrupted = outer_stop_.stop_requested();
   outcome_.failure = failures_.text();
   outcome_.messages = autosave_.take_failures();

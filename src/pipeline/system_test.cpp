@@ -79,8 +79,14 @@ TEST(RunSlam, GoesOnWhenTheGpuIsLost) {
   EXPECT_NE(settings.gpu->failure(), "");
   EXPECT_EQ(outcome.failure, "");
   for (const FrameOutcome& frame : outcome.frames) EXPECT_TRUE(frame.has_pose) << frame.frame.value;
-  EXPECT_EQ(outcome.iterations, run(CornerSource(20), deterministic(1)).iterations);
   EXPECT_GT(outcome.final.gaussians.size(), 200u);
+  ASSERT_TRUE(outcome.gpu.has_value());
+  EXPECT_GT(outcome.gpu->peak_mb, 0);
+  EXPECT_GT(outcome.gpu->busy_seconds, 0);
+  EXPECT_LT(outcome.gpu->busy_seconds, outcome.seconds_online + outcome.seconds_drain);
+  const RunOutcome without = run(CornerSource(20), deterministic(1));
+  EXPECT_EQ(outcome.iterations, without.iterations);
+  EXPECT_FALSE(without.gpu.has_value());
 }
 #endif
 

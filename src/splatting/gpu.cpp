@@ -266,6 +266,7 @@ bool Gpu::backward(const GaussianModel& model, std::span<const float> dl_drgb, s
     const cuda::Figures figures =
         state_->engine->backward(pointer(dl_drgb), pointer(dl_ddepth), pointer(dl_dalpha), gradients.values.data());
     std::transform(figures.pose, figures.pose + 6, gradients.pose, [](double v) { return static_cast<float>(v); });
+    state_->busy_ms += stage_times(figures).total();
   });
 }
 

@@ -29,7 +29,8 @@ class Gpu {
   const std::string& name() const { return name_; }
   /// Most memory in use at any time, the driver's own not included [MB].
   double peak_mb() const;
-  /// How long it has worked in all [s].
+  /// How long it has drawn and trained in all [s], by its own clock, from the first kernel of each call to the last.
+  /// Transfers of models and densification do not count.
   double busy_seconds() const;
   /// Why it is of no more use; empty as long as all goes well.
   const std::string& failure() const;

@@ -12,6 +12,7 @@
 
 #include "base/archive.h"
 #include "base/check.h"
+#include "base/clock.h"
 #include "splatting/cuda/engine.h"
 #include "splatting/cuda/host_device.h"
 #include "splatting/testing/scenes.h"
@@ -22,15 +23,23 @@ namespace {
 using cuda::DeviceError;
 using testing::Scene;
 
-/// The engine on the host, that fails when told to.
-class FragileEngine final : public cuda::DeviceEngine {
+struct Faults {
+  int calls_left = -1;  ///< Until everything fails for good; -1: never.
+  int steps_left = -1;  ///< Until steps fail, as they do when memory is short.
+  int fetches = 0;
+};
+
+/// The host as a GPU whose arrays grow by more than is asked for, so that the next time there is room.
+class RoomyDevice final : public cuda::HostDevice {
  public:
-  struct Faults {
-    int calls_left = -1;  ///< Until everything fails for good; -1: never.
-    int steps_left = -1;  ///< Until steps fail, as they do when memory is short.
-    int fetches = 0;
-  };
-  FragileEngine(Faults& fate, uint64_t memory_limit) : fate_(fate), engine_(cuda::HostDevice(), memory_limit) {}
+  static constexpr size_t kSpareShare = 2;
+};
+
+/// The engine on the host, that fails when told to.
+template <class Device>
+class FragileEngineOn final : public cuda::DeviceEngine {
+ public:
+  FragileEngineOn(Faults& fate, uint64_t memory_limit) : fate_(fate), engine_(Device(), memory_limit) {}
 
   void arrange(const cuda::Arrangement& arrangement) override { live().arrange(arrangement); }
   void fetch(int first_row, int num_rows, float* rows) override {
@@ -60,11 +69,11 @@ class FragileEngine final : public cuda::DeviceEngine {
     return engine_;
   }
   Faults& fate_;
-  cuda::Engine<cuda::HostDevice> engine_;
+  cuda::Engine<Device> engine_;
 };
 
-std::shared_ptr<Gpu> make_gpu(FragileEngine::Faults& fate) {
-  return std::make_shared<Gpu>(std::make_unique<FragileEngine>(fate, uint64_t{1} << 30), "host");
+std::shared_ptr<Gpu> make_gpu(Faults& fate) {
+  return std::make_shared<Gpu>(std::make_unique<FragileEngineOn<cuda::HostDevice>>(fate, uint64_t{1} << 30), "host");
 }
 
 Scene small_scene(uint64_t seed) {
@@ -196,9 +205,30 @@ void expect_steps_of_any_size_as_on_the_cpu(const std::shared_ptr<Gpu>& gpu) {
 }
 
 TEST(Gpu, TrainsAsTheCpuDoes) {
-  FragileEngine::Faults fate;
+  Faults fate;
   expect_training_as_on_the_cpu(make_gpu(fate));
   expect_steps_of_any_size_as_on_the_cpu(make_gpu(fate));
+}
+
+TEST(Gpu, IsBusyWhileItDrawsAndTrains) {
+  Faults fate;
+  const auto gpu = make_gpu(fate);
+  EXPECT_EQ(gpu->busy_seconds(), 0);
+  Scene scene = small_scene(67);
+  const TargetImage target = make_target(scene, 68);
+  SerialExecutor executor;
+  Trainer trainer(gpu);
+  Gradients gradients;
+  const Stopwatch watch;
+  const double step = trainer.step(scene.model, scene.view, target, train_options(scene), executor).times.total();
+  EXPECT_GT(step, 0);
+  EXPECT_NEAR(gpu->busy_seconds(), 1e-3 * step, 1e-9);
+  trainer.forward(scene.model, scene.view, scene.options, executor);
+  const double drawn = gpu->busy_seconds();
+  EXPECT_GT(drawn, 1e-3 * step);
+  trainer.backward(scene.model, std::vector<float>(3 * scene.plane(), 1), {}, {}, executor, gradients);
+  EXPECT_GT(gpu->busy_seconds(), drawn);
+  EXPECT_LT(gpu->busy_seconds(), watch.seconds());
 }
 
 TEST(Gpu, OfThisMachineTrainsAsTheCpuDoes) {
@@ -210,7 +240,7 @@ TEST(Gpu, OfThisMachineTrainsAsTheCpuDoes) {
 }
 
 TEST(Gpu, DrawsAsTheCpuDoes) {
-  FragileEngine::Faults fate;
+  Faults fate;
   const Scene scene = small_scene(53);
   SerialExecutor executor;
   RenderResult want, got;
@@ -269,8 +299,7 @@ void edit(GaussianModel& model, int kind, Random& random) {
 }
 
 /// A remote copy without arithmetic: what comes back must be what a model without one holds, bit for bit.
-TEST(Gpu, ModelsSurviveAnyOrderOfChangesAndExchanges) {
-  FragileEngine::Faults fate;
+void expect_models_to_survive_changes_on(const std::shared_ptr<Gpu>& gpu) {
   Scene plain = small_scene(54), remote = small_scene(54);
   Random statistics(55);
   plain.model.for_each([&](size_t i) {
@@ -279,7 +308,6 @@ TEST(Gpu, ModelsSurviveAnyOrderOfChangesAndExchanges) {
       values[r * kBlockSize] = static_cast<float>(statistics.uniform());
   });
   for (size_t b = 0; b < plain.model.num_blocks(); ++b) remote.model.block(b) = plain.model.block(b);
-  const auto gpu = make_gpu(fate);
   StageTimes times;
   int visible = 0;
   Random choices(56);
@@ -304,8 +332,15 @@ TEST(Gpu, ModelsSurviveAnyOrderOfChangesAndExchanges) {
   EXPECT_EQ(want.bytes(), got.bytes());
 }
 
+TEST(Gpu, ModelsSurviveAnyOrderOfChangesAndExchanges) {
+  Faults fate;
+  expect_models_to_survive_changes_on(make_gpu(fate));
+  expect_models_to_survive_changes_on(
+      std::make_shared<Gpu>(std::make_unique<FragileEngineOn<RoomyDevice>>(fate, uint64_t{1} << 30), "host"));
+}
+
 TEST(Gpu, FetchesOnceAndOnlyWhatIsAskedFor) {
-  FragileEngine::Faults fate;
+  Faults fate;
   Scene scene = small_scene(57);
   const TargetImage target = make_target(scene, 58);
   SerialExecutor executor;
@@ -326,7 +361,7 @@ TEST(Gpu, FetchesOnceAndOnlyWhatIsAskedFor) {
 }
 
 TEST(Gpu, WhenMemoryRunsOutTheCpuContinuesFromTheSameValues) {
-  FragileEngine::Faults fate, sound;
+  Faults fate, sound;
   Scene scene = small_scene(59), other = small_scene(59);
   const TargetImage target = make_target(scene, 60);
   const TrainOptions options = train_options(scene);
@@ -346,7 +381,7 @@ TEST(Gpu, WhenMemoryRunsOutTheCpuContinuesFromTheSameValues) {
 }
 
 TEST(Gpu, WhenItIsGoneTheCpuContinuesFromWhatWasFetchedLast) {
-  FragileEngine::Faults fate;
+  Faults fate;
   Scene scene = small_scene(61);
   const TargetImage target = make_target(scene, 62);
   const TrainOptions options = train_options(scene);
@@ -368,7 +403,7 @@ TEST(Gpu, WhenItIsGoneTheCpuContinuesFromWhatWasFetchedLast) {
 }
 
 TEST(Gpu, HoldsOneModelAtATime) {
-  FragileEngine::Faults fate;
+  Faults fate;
   const auto gpu = make_gpu(fate);
   StageTimes times;
   int visible = 0;

@@ -71,7 +71,7 @@ struct Adam {
 class Training : public ::testing::TestWithParam<int64_t> {
  protected:
   testing::ScopedSimdTarget simd_target{GetParam()};
-  SerialExecutor executor_;
+  SerialExecutor executor;
 };
 
 INSTANTIATE_TEST_SUITE_P(Simd, Training, ::testing::ValuesIn(testing::simd_targets()),
@@ -89,14 +89,14 @@ TEST_P(Training, StepIsAdamOnTheGradientsOfTheLoss) {
     LossFunction loss;
     std::vector<Adam> adam(scene.indices.size() * row::kCount);
     for (int step = 1; step <= 4; ++step) {
-      plain.forward(scene.model, scene.view, options.render, executor_);
+      plain.forward(scene.model, scene.view, options.render, executor);
       std::vector<float> dl_drgb;
-      loss.evaluate(plain.rendered().rgb, target, options.ssim_weight, {}, executor_, dl_drgb);
+      loss.evaluate(plain.rendered().rgb, target, options.ssim_weight, {}, executor, dl_drgb);
       Gradients gradients;
-      plain.backward(scene.model, dl_drgb, {}, {}, executor_, gradients);
+      plain.backward(scene.model, dl_drgb, {}, {}, executor, gradients);
       const std::vector<float> before = all_parameters(scene.model);
       scene.model.reset_statistics();
-      trainer.step(scene.model, scene.view, target, options, executor_);
+      trainer.step(scene.model, scene.view, target, options, executor);
       const std::vector<float> after = all_parameters(scene.model);
       for (size_t i = 0; i < after.size(); ++i) {
         const size_t index = i / row::kCount;  // one anchor: indices are dense
@@ -123,7 +123,7 @@ TEST_P(Training, FitsAnImage) {
   scene.build(23);
   Renderer renderer;
   RenderResult image;
-  renderer.render(scene.model, scene.view, scene.options, executor_, image);
+  renderer.render(scene.model, scene.view, scene.options, executor, image);
   const TargetImage target = target_of(image);
   Random random(24);
   for (size_t index : scene.indices) {
@@ -138,9 +138,9 @@ TEST_P(Training, FitsAnImage) {
   options.render = scene.options;
   options.rates.mean = 1e-3f;
   options.rates.sh_dc = 2e-2f;
-  const StepResult first = trainer.step(scene.model, scene.view, target, options, executor_);
+  const StepResult first = trainer.step(scene.model, scene.view, target, options, executor);
   StepResult last;
-  for (int i = 0; i < 150; ++i) last = trainer.step(scene.model, scene.view, target, options, executor_);
+  for (int i = 0; i < 150; ++i) last = trainer.step(scene.model, scene.view, target, options, executor);
   EXPECT_LT(last.loss, 0.25f * first.loss);
   EXPECT_LT(last.mse, 0.05f * first.mse);
 }
@@ -188,7 +188,7 @@ TEST_P(Training, FrozenGroupsAndUnusedDegreesStay) {
   options.rates.mean = options.rates.opacity = 0;
   Trainer trainer;
   const std::vector<float> before = all_parameters(scene.model);
-  trainer.step(scene.model, scene.view, target, options, executor_);
+  trainer.step(scene.model, scene.view, target, options, executor);
   const std::vector<float> after = all_parameters(scene.model);
   std::vector<int> changed(row::kCount);
   for (size_t i = 0; i < before.size(); ++i) changed[i % row::kCount] += before[i] != after[i];
@@ -207,7 +207,7 @@ TEST_P(Training, WithoutUpdateOnlyReports) {
   options.update = false;
   Trainer trainer;
   const std::vector<float> before = all_parameters(scene.model);
-  const StepResult result = trainer.step(scene.model, scene.view, target, options, executor_);
+  const StepResult result = trainer.step(scene.model, scene.view, target, options, executor);
   EXPECT_EQ(before, all_parameters(scene.model));
   EXPECT_EQ(scene.model.statistics(scene.indices[0]).visible, 0);
   EXPECT_NE(result.pose_gradient[0], 0);
@@ -219,13 +219,13 @@ TEST_P(Training, OpacityWeightLowersOpacities) {
   scene.build(33);
   Renderer renderer;
   RenderResult image;
-  renderer.render(scene.model, scene.view, scene.options, executor_, image);
+  renderer.render(scene.model, scene.view, scene.options, executor, image);
   TrainOptions options;
   options.render = scene.options;
   options.opacity_weight = 1e3f;  // drowns the image
   Trainer trainer;
   const std::vector<float> before = all_parameters(scene.model);
-  trainer.step(scene.model, scene.view, target_of(image), options, executor_);
+  trainer.step(scene.model, scene.view, target_of(image), options, executor);
   const std::vector<float> after = all_parameters(scene.model);
   for (size_t i = row::kOpacity; i < after.size(); i += row::kCount)
     if (scene.model.statistics(i / row::kCount).visible > 0) {
@@ -251,7 +251,7 @@ TEST_P(Training, DepthLossMovesGaussiansTowardsTheMeasuredDepth) {
   Trainer trainer;
   StepResult result;
   for (int i = 0; i < 120; ++i)
-    result = trainer.step(model, {{16, 16, 16, 16, 8, 8}, poses}, target, options, executor_);
+    result = trainer.step(model, {{16, 16, 16, 16, 8, 8}, poses}, target, options, executor);
   EXPECT_NEAR(model.get(0).mean[2], 3, 0.05);
   EXPECT_LT(result.depth, 0.05f);
 }
@@ -261,7 +261,7 @@ TEST_P(Training, PoisonLeavesTheRestClean) {
   const auto render = [&](const GaussianModel& model, const Scene& scene) {
     Renderer renderer;
     RenderResult image;
-    renderer.render(model, scene.view, scene.options, executor_, image);
+    renderer.render(model, scene.view, scene.options, executor, image);
     return image;
   };
   Scene scene;
@@ -291,7 +291,7 @@ TEST_P(Training, PoisonLeavesTheRestClean) {
   TrainOptions options;
   options.render = scene.options;
   for (int i = 0; i < 3; ++i)
-    trainer.step(scene.model, scene.view, random_target(scene.width, scene.height, 32), options, executor_);
+    trainer.step(scene.model, scene.view, random_target(scene.width, scene.height, 32), options, executor);
   const RenderResult trained = render(scene.model, scene);
   for (float v : trained.rgb) ASSERT_TRUE(std::isfinite(v));
 }
@@ -315,7 +315,7 @@ TEST_P(Training, PoisonedCamerasShowTheBackground) {
         if (member == 5) pose.translation[2] = static_cast<double>(poison);
       }
       if (member < 4) *intrinsics[member] = poison;
-      const StepResult result = trainer.step(scene.model, view, target, options, executor_);
+      const StepResult result = trainer.step(scene.model, view, target, options, executor);
       EXPECT_EQ(result.visible, 0) << poison << " in member " << member;
       EXPECT_TRUE(std::isfinite(result.loss));
       for (float gradient : result.pose_gradient) EXPECT_EQ(gradient, 0);
@@ -340,7 +340,7 @@ TEST_P(Training, ManyInOneTileSortByDepthThenIndex) {
   const std::vector<Pose> poses(1);
   Renderer renderer;
   RenderResult image;
-  renderer.render(model, {{1, 1, 1, 1, 0, 0}, poses}, {}, executor_, image);
+  renderer.render(model, {{1, 1, 1, 1, 0, 0}, poses}, {}, executor, image);
   std::vector<size_t> order(gaussians.size());
   std::iota(order.begin(), order.end(), size_t{0});
   std::stable_sort(order.begin(), order.end(),
@@ -363,17 +363,17 @@ TEST_P(Training, DegenerateSizesWork) {
   const std::vector<Pose> poses(1);
   const View view{{1, 1, 1, 1, 0, 0}, poses};
   const TargetImage target(1, 1, std::vector<uint8_t>{10, 20, 30});
-  EXPECT_EQ(trainer.step(model, view, target, {}, executor_).visible, 0);  // no anchors, no gaussians
+  EXPECT_EQ(trainer.step(model, view, target, {}, executor).visible, 0);  // no anchors, no gaussians
   model.add_anchor();
-  EXPECT_EQ(trainer.step(model, view, target, {}, executor_).visible, 0);
+  EXPECT_EQ(trainer.step(model, view, target, {}, executor).visible, 0);
   std::vector<Gaussian> same(5000);
   for (Gaussian& g : same) g.mean[2] = 1;
   model.add(0, same);
-  const StepResult result = trainer.step(model, view, target, {}, executor_);
+  const StepResult result = trainer.step(model, view, target, {}, executor);
   EXPECT_EQ(result.visible, 5000);
   EXPECT_TRUE(std::isfinite(result.loss));
   const TargetImage no_data(1, 1, std::vector<uint8_t>{10, 20, 30}, std::vector<uint8_t>{0});
-  EXPECT_TRUE(std::isfinite(trainer.step(model, view, no_data, {}, executor_).loss));
+  EXPECT_TRUE(std::isfinite(trainer.step(model, view, no_data, {}, executor).loss));
 }
 
 TEST(Trainer, RejectsMismatchedSizes) {

@@ -134,6 +134,7 @@ std::string resource_table(const Report& report) {
       .row("duration of the run", show(report.seconds_total, 1, "s"))
       .row("memory, peak", show(report.memory.peak_rss_mb, 0, "MB"))
       .row("GPU memory, peak", show(report.memory.gpu_mb, 0, "MB"))
+      .row("GPU, part of the time at work", show(report.gpu.utilisation, 0, "%", 100))
       .row("rendering, frames per second", show(report.render.fps, 1, ""))
       .text();
 }

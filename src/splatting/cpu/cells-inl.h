@@ -121,7 +121,8 @@ HWY_INLINE void locate(const Splat& s, Vec x, Vec y, Vec& t, Vec& dy) {
 
 struct GroupMasks {
   Mask masks[kGroupVectors];
-  HWY_INLINE GroupMasks() {}  // an implicit one would not belong to the SIMD target
+  // NOLINTNEXTLINE(modernize-use-equals-default): a defaulted one would not belong to the SIMD target
+  HWY_INLINE GroupMasks() {}
 };
 
 /// Unclamped alpha from t and dy for four vectors in lockstep, zero below the cut-off; returns where it is not.

@@ -36,7 +36,7 @@ double relative_error(const std::vector<double>& got, const std::vector<double>&
 class Engine : public ::testing::TestWithParam<int64_t> {
  protected:
   testing::ScopedSimdTarget simd_target{GetParam()};
-  SerialExecutor executor_;
+  SerialExecutor executor;
 };
 
 INSTANTIATE_TEST_SUITE_P(Simd, Engine, ::testing::ValuesIn(testing::simd_targets()),
@@ -48,7 +48,7 @@ TEST_P(Engine, ImagesEqualTheOracle) {
     const reference::Image want = reference::render(scene.reference_gaussians, scene.reference_view, scene.noise);
     Renderer renderer;
     RenderResult got;
-    renderer.render(scene.model, scene.view, scene.options, executor_, got);
+    renderer.render(scene.model, scene.view, scene.options, executor, got);
     ASSERT_EQ(got.width, scene.width);
     ASSERT_EQ(got.height, scene.height);
     double worst = 0, ambiguous = 0, covered = 0;
@@ -86,8 +86,8 @@ TEST_P(Engine, GradientsEqualTheOracle) {
     Trainer trainer;
     Gradients got;
     const auto floats = [](const std::vector<double>& v) { return std::vector<float>(v.begin(), v.end()); };
-    trainer.forward(scene.model, scene.view, scene.options, executor_);
-    trainer.backward(scene.model, floats(dl_drgb), floats(dl_ddepth), floats(dl_dalpha), executor_, got);
+    trainer.forward(scene.model, scene.view, scene.options, executor);
+    trainer.backward(scene.model, floats(dl_drgb), floats(dl_ddepth), floats(dl_dalpha), executor, got);
 
     for (const Group& group : kGroups) {
       std::vector<double> a, b;
@@ -117,7 +117,7 @@ TEST_P(Engine, OneSplatHasTheClosedForm) {
   const View view{{41, 37, 50, 50, 20, 18}, poses};
   Renderer renderer;
   RenderResult image;
-  renderer.render(model, view, {.near = 0.01f, .background = {0, 0, 1}, .sh_degree = 3}, executor_, image);
+  renderer.render(model, view, {.near = 0.01f, .background = {0, 0, 1}, .sh_degree = 3}, executor, image);
   EXPECT_EQ(image.visible, 1);
   const double opacity = 1 / (1 + std::exp(-0.4)), variance = std::pow(0.1 * 50 / 2, 2) + 0.3;
   for (int y = 0; y < 37; ++y)
@@ -146,7 +146,7 @@ TEST_P(Engine, NearSplatsHideFarOnesUntilTransmittanceIsSpent) {
   const std::vector<Pose> poses(1);
   Renderer renderer;
   RenderResult image;
-  renderer.render(model, {{1, 1, 10, 10, 0, 0}, poses}, {}, executor_, image);
+  renderer.render(model, {{1, 1, 10, 10, 0, 0}, poses}, {}, executor, image);
   // Transmittance 0.05, 0.0025, 1.25e-4; the fourth would leave 6e-6 <= 1e-4: blending stops before it.
   EXPECT_NEAR(image.alpha[0], 1 - 1.25e-4, 1e-6);
   EXPECT_NEAR(image.depth[0], 0.95 * (1 + 0.05 * 2 + 0.0025 * 3), 1e-6);

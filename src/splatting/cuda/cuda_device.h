@@ -25,8 +25,7 @@ class CudaDevice {
  public:
   static constexpr size_t kSpareShare = 8;  ///< Arrays that grow take an eighth more.
 
-  CudaDevice() {
-    check_cuda(cudaGetDevice(&device_), "choosing a GPU");
+  CudaDevice() : CudaDevice(current_device()) {  // from here on the destructor cleans up after an exception
     check_cuda(cudaDeviceGetAttribute(&num_units_, cudaDevAttrMultiProcessorCount, device_), "asking the GPU");
     check_cuda(cudaDeviceGetAttribute(&has_pools_, cudaDevAttrMemoryPoolsSupported, device_), "asking the GPU");
     check_cuda(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "making a stream");
@@ -37,9 +36,11 @@ class CudaDevice {
   ~CudaDevice() {
     if (stream_ == nullptr) return;
     (void)cudaStreamSynchronize(stream_);
-    for (cudaEvent_t event : marks_) (void)cudaEventDestroy(event);
+    for (cudaEvent_t event : marks_)
+      if (event != nullptr) (void)cudaEventDestroy(event);
     (void)cudaFreeHost(staging_);
     (void)cudaStreamDestroy(stream_);
+    (void)cudaGetLastError();
   }
   CudaDevice(CudaDevice&& other) noexcept
       : device_(other.device_),
@@ -70,6 +71,7 @@ class CudaDevice {
   void release(void* data) {
     (void)cudaSetDevice(device_);
     (void)(has_pools_ != 0 ? cudaFreeAsync(data, stream_) : cudaFree(data));
+    (void)cudaGetLastError();  // or the next launch would report it as its own
   }
 
   /// `from` may change as soon as this returns. Little data is only queued; of much the copy is waited for.
@@ -105,6 +107,7 @@ class CudaDevice {
     wait();
   }
   void clear(void* data, size_t bytes) {
+    if (bytes == 0) return;
     bind();
     check_cuda(cudaMemsetAsync(data, 0, bytes, stream_), "clearing GPU memory");
   }
@@ -128,6 +131,13 @@ class CudaDevice {
  private:
   static constexpr int kMarks = 8;
   static constexpr size_t kStagingSize = size_t{1} << 20;
+
+  explicit CudaDevice(int device) : device_(device) {}
+  static int current_device() {
+    int device = 0;
+    check_cuda(cudaGetDevice(&device), "choosing a GPU");
+    return device;
+  }
 
   /// Some drivers claim pools of memory that they then refuse (virtual machines).
   void probe_pools() {

@@ -12,6 +12,12 @@ namespace {
 
 constexpr int kOldestMajor = 7, kOldestMinor = 5;  // compute capability
 
+/// Whether the module holds code for the current GPU, or code that its driver can compile for it.
+bool has_code() {
+  cudaFuncAttributes attributes{};
+  return cudaFuncGetAttributes(&attributes, run_kernel<ClearStatistics>) == cudaSuccess;
+}
+
 /// The GPU to use: the first one that is new enough.
 bool choose_gpu(char* text, int size) {
   const auto length = static_cast<size_t>(size);
@@ -28,11 +34,11 @@ bool choose_gpu(char* text, int size) {
     const int runs = properties.major * 10 + properties.minor >= kOldestMajor * 10 + kOldestMinor;
     std::snprintf(text, length, "%s, %.1f GB, compute capability %d.%d", properties.name,
                   1e-9 * static_cast<double>(properties.totalGlobalMem), properties.major, properties.minor);
-    if (runs != 0 && cudaSetDevice(i) == cudaSuccess && cudaFree(nullptr) == cudaSuccess) return true;
+    if (runs != 0 && cudaSetDevice(i) == cudaSuccess && cudaFree(nullptr) == cudaSuccess && has_code()) return true;
   }
   (void)cudaGetLastError();
-  std::snprintf(text, length, "no GPU that is free and of compute capability %d.%d or newer", kOldestMajor,
-                kOldestMinor);
+  std::snprintf(text, length, "no GPU that is free, of compute capability %d.%d or newer, and compiled for",
+                kOldestMajor, kOldestMinor);
   return false;
 }
 

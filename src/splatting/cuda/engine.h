@@ -26,13 +26,18 @@ struct Results {
 template <class Device>
 class Engine final : public DeviceEngine {
  public:
-  Engine(Device device, uint64_t memory_limit) : device_(std::move(device)), memory_(device_, memory_limit) {
+  /// Numbers of 32 bits count the pixels of all buckets of so many instances.
+  static constexpr uint32_t kMostInstances = 1u << 28;
+
+  Engine(Device device, uint64_t memory_limit, uint32_t most_instances = kMostInstances)
+      : device_(std::move(device)), memory_(device_, memory_limit), most_instances_(most_instances) {
     memory_.make_room = [this] { return targets_.drop_oldest(); };
     results_.reserve(1);
   }
 
   void arrange(const Arrangement& arrangement) override;
   void fetch(int first_row, int num_rows, float* rows) override {
+    if (num_blocks_ == 0) return;
     device_.download_rows(rows, &blocks_.data()->parameters[0][0] + first_row * kBlockSize, sizeof(Block),
                           static_cast<size_t>(num_rows) * sizeof(float) * kBlockSize, num_blocks_);
   }
@@ -72,7 +77,7 @@ class Engine final : public DeviceEngine {
   void compare_depth(const Target& target, float unit, float weight);
   void unblend(bool with_depth, bool with_alpha);
   void update_model(const UpdateConstants& constants, bool update, float* dense);
-  Figures read_figures(Mark last);
+  Figures read_figures(Mark first, Mark last);
   void reserve_instances(bool keep);
   bool has_lost_too_many(const Figures& figures, bool keep);
 
@@ -99,6 +104,7 @@ class Engine final : public DeviceEngine {
   Buffer<Checkpoint> checkpoints_{memory_};   // [buckets, kTilePixels]
   Buffer<uint32_t> tile_begin_{memory_}, bucket_begin_{memory_}, used_buckets_{memory_};
   Buffer<float> rgb_{memory_}, depth_{memory_}, alpha_{memory_};
+  const uint32_t most_instances_;
   uint32_t capacity_ = 0;       // instances there is room for
   bool tolerate_lost_ = false;  // there will be no more room
 
@@ -186,7 +192,10 @@ void Engine<Device>::begin(const DeviceView& view) {
   depth_.reserve(plane());
   alpha_.reserve(plane());
   constexpr uint32_t kLeast = 1024, kPerSlot = 6;
-  if (capacity_ == 0) capacity_ = std::max(kLeast, kPerSlot * num_slots());
+  if (capacity_ == 0) {
+    const uint64_t guess = std::max<uint64_t>(kLeast, uint64_t{kPerSlot} * slots);
+    capacity_ = static_cast<uint32_t>(std::min<uint64_t>(guess, most_instances_));
+  }
 
   Results results{};
   results.slots = num_slots();
@@ -323,7 +332,7 @@ void Engine<Device>::update_model(const UpdateConstants& constants, bool update,
 }
 
 template <class Device>
-Figures Engine<Device>::read_figures(Mark last) {
+Figures Engine<Device>::read_figures(Mark first, Mark last) {
   Results results;
   device_.download(&results, results_.data(), sizeof(results));
   Figures figures;
@@ -336,7 +345,7 @@ Figures Engine<Device>::read_figures(Mark last) {
   }
   figures.depth = results.depth;
   std::copy_n(results.pose, 6, figures.pose);
-  for (int i = 0; i < last; ++i) figures.times[i] = device_.milliseconds(i, i + 1);
+  for (int i = first; i < last; ++i) figures.times[i] = device_.milliseconds(i, i + 1);
   return figures;
 }
 
@@ -345,9 +354,13 @@ Figures Engine<Device>::read_figures(Mark last) {
 template <class Device>
 bool Engine<Device>::has_lost_too_many(const Figures& figures, bool keep) {
   if (figures.lost == 0 || tolerate_lost_) return false;
-  const uint32_t before = capacity_, wanted = figures.instances + figures.lost;
-  constexpr uint32_t kMost = 1u << 28;
-  capacity_ = std::min(wanted + wanted / 4, kMost);
+  const uint32_t before = capacity_;
+  if (before >= most_instances_) {
+    tolerate_lost_ = true;
+    return true;
+  }
+  const uint64_t wanted = uint64_t{figures.instances} + figures.lost;
+  capacity_ = static_cast<uint32_t>(std::min<uint64_t>(wanted + wanted / 4, most_instances_));
   try {
     reserve_instances(keep);
   } catch (const DeviceError& error) {
@@ -366,7 +379,7 @@ template <class Device>
 Figures Engine<Device>::forward(const DeviceView& view, bool keep) {
   while (true) {
     draw(view, keep);
-    const Figures figures = read_figures(kBlended);
+    const Figures figures = read_figures(kStart, kBlended);
     if (!has_lost_too_many(figures, keep)) return figures;
   }
 }
@@ -390,10 +403,13 @@ Figures Engine<Device>::backward(const float* dl_drgb, const float* dl_ddepth, c
   take(dl_dalpha_, dl_dalpha, plane());
   const size_t values = size_t{num_blocks_} * row::kCount * kBlockSize;
   dense_.reserve(values);
+  device_.mark(kCompared);
   unblend(dl_ddepth != nullptr, dl_dalpha != nullptr);
+  device_.mark(kUnblended);
   update_model({}, false, dense_.data());
+  device_.mark(kUpdated);
   device_.download(dense, dense_.data(), values * sizeof(float));
-  return read_figures(kStart);
+  return read_figures(kCompared, kUpdated);
 }
 
 template <class Device>
@@ -410,7 +426,7 @@ Figures Engine<Device>::step(const DeviceView& view, const DeviceTarget& target,
     device_.mark(kUnblended);
     update_model(constants, update, nullptr);
     device_.mark(kUpdated);
-    Figures figures = read_figures(kUpdated);
+    Figures figures = read_figures(kStart, kUpdated);
     figures.num_valid = compared.num_valid;
     figures.num_depth = compared.num_depth;
     if (!has_lost_too_many(figures, true)) return figures;

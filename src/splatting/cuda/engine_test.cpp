@@ -33,8 +33,11 @@ struct OnDevice {
   std::vector<float> rgb, depth, alpha;
   Figures figures;
 
-  explicit OnDevice(const Scene& scene, uint64_t memory_limit = kPlenty, TestDevice device = TestDevice())
-      : engine(std::move(device), memory_limit), plane(scene.plane()), num_blocks(scene.model.num_blocks()) {
+  explicit OnDevice(const Scene& scene, uint64_t memory_limit = kPlenty, TestDevice device = TestDevice(),
+                    uint32_t most_instances = Engine<TestDevice>::kMostInstances)
+      : engine(std::move(device), memory_limit, most_instances),
+        plane(scene.plane()),
+        num_blocks(scene.model.num_blocks()) {
     for (const splatting::Pose& pose : scene.poses)
       anchors.push_back(make_anchor_view(pose, scene.view.camera, scene.options.near));
     view.width = scene.width;
@@ -103,6 +106,27 @@ TEST(CudaEngine, PrefixSumsSpanRows) {
   prefix_sums(device, array.data(), kCount, rows.data(), total.data());
   EXPECT_EQ(to_host(device, array, kCount), want);
   EXPECT_EQ(to_host(device, total, 1)[0], want.back() + (kCount - 1) % 7);
+}
+
+TEST(CudaEngine, PrefixSumsStayAtTheLargestNumber) {
+  TestDevice device;
+  Memory<TestDevice> memory(device, kPlenty);
+  for (const uint32_t step : {1u, 300u, kPrefixColumns}) {  // within a round of threads, a row, and from row to row
+    constexpr uint32_t kCount = 6 * kPrefixColumns;
+    std::vector<uint32_t> values(kCount), want(kCount);
+    uint64_t sum = 0;
+    for (uint32_t i = 0; i < kCount; ++i) {
+      values[i] = i % step == 0 && i < 6 * step ? 0x30000000u + i : 0;
+      want[i] = static_cast<uint32_t>(std::min<uint64_t>(sum, 0xffffffffu));
+      sum += values[i];
+    }
+    const auto array = to_device(device, memory, values);
+    const auto rows = to_device(device, memory, std::vector<uint32_t>(6));
+    const auto total = to_device(device, memory, std::vector<uint32_t>(1));
+    prefix_sums(device, array.data(), kCount, rows.data(), total.data());
+    EXPECT_EQ(to_host(device, array, kCount), want) << step;
+    EXPECT_EQ(to_host(device, total, 1)[0], 0xffffffffu) << step;
+  }
 }
 
 TEST(CudaEngine, ImagesEqualTheOracle) {
@@ -434,6 +458,25 @@ TEST(CudaEngine, WhatFindsNoRoomIsTheFarthest) {
   EXPECT_EQ(some.figures.instances + some.figures.lost, all.figures.instances);
   EXPECT_LE(some.engine.peak_bytes(), limit);
   for (size_t i = 0; i < scene.plane(); ++i) EXPECT_LE(some.alpha[i], all.alpha[i] + 1e-6f);
+}
+
+TEST(CudaEngine, ThereIsALimitToTheInstancesWhateverTheMemory) {
+  Scene scene;
+  scene.count = 80;
+  scene.log_scale_max = -0.3;
+  scene.width = 64;
+  scene.height = 48;
+  scene.build(25);
+  const Lesson lesson(scene);
+  OnDevice all(scene);
+  all.draw();
+  for (const uint32_t most : {200u, all.figures.instances - 1}) {
+    OnDevice some(scene, kPlenty, TestDevice(), most);
+    const Figures figures = some.engine.step(some.view, lesson.target, lesson.loss, lesson.constants, true);
+    EXPECT_EQ(figures.instances, most);
+    EXPECT_EQ(figures.lost, all.figures.instances - most);
+    EXPECT_NE(some.rows(), all.rows()) << "no step was made";
+  }
 }
 
 TEST(CudaEngine, OutOfMemoryLeavesTheModelAsItWas) {

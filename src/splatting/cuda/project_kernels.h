@@ -188,7 +188,7 @@ struct EmitInstances {
   using Shared = NoShared;
   const uint32_t* order;
   const uint32_t* tiles;
-  const uint32_t* offsets;  ///< Of order[i].
+  const uint32_t* offsets;  ///< Of order[i]; saturated where they are greater than any capacity.
   uint32_t num_slots;
   const Splat* splats;
   Extent image;
@@ -203,7 +203,7 @@ struct EmitInstances {
     if (i >= num_slots) return;
     const uint32_t slot = order[i], count = tiles[slot], first = offsets[i];
     first_instance[slot] = first;
-    if (count == 0) return;
+    if (count == 0 || first >= capacity) return;
     uint32_t n = 0;
     const auto emit = [&](int tile) {
       const uint32_t at = first + n;

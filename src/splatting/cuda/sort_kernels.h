@@ -42,7 +42,14 @@ struct CountDigits {
   }
 };
 
-/// Exclusive sum of one value per thread over its block; `total` is the sum of all. Uses `scratch` [2, threads].
+/// Sums that 32 bits do not hold stay at the largest number.
+PHOTOSLAM_DEVICE uint32_t saturating_sum(uint32_t a, uint32_t b) {
+  const uint32_t sum = a + b;
+  return sum < a ? 0xffffffffu : sum;
+}
+
+/// Exclusive saturating sum of one value per thread over its block; `total` is the sum of all. Uses `scratch`
+/// [2, threads].
 template <class Group>
 PHOTOSLAM_DEVICE uint32_t block_prefix(Group& group, uint32_t value, uint32_t* scratch, uint32_t threads,
                                        uint32_t& total) {
@@ -52,19 +59,20 @@ PHOTOSLAM_DEVICE uint32_t block_prefix(Group& group, uint32_t value, uint32_t* s
   from[thread] = value;
   group.sync();
   for (uint32_t step = 1; step < threads; step *= 2) {
-    to[thread] = from[thread] + (thread >= step ? from[thread - step] : 0);
+    to[thread] = saturating_sum(from[thread], thread >= step ? from[thread - step] : 0);
     group.sync();
     uint32_t* const swap = from;
     from = to;
     to = swap;
   }
-  const uint32_t before = from[thread] - value;
+  const uint32_t before = thread > 0 ? from[thread - 1] : 0;
   total = from[threads - 1];
   group.sync();
   return before;
 }
 
-/// Exclusive prefix sums of `rows` rows of `columns` numbers, in place, one thread block per row; totals [rows].
+/// Exclusive saturating prefix sums of `rows` rows of `columns` numbers, in place, one thread block per row; totals
+/// [rows].
 struct PrefixRows {
   static constexpr int kThreads = kSortThreads;
   struct Shared {
@@ -83,8 +91,8 @@ struct PrefixRows {
       uint32_t total = 0;
       const uint32_t value = i < columns ? values[row * columns + i] : 0;
       const uint32_t before = block_prefix(group, value, shared.scratch, kSortThreads, total);
-      if (i < columns) values[row * columns + i] = sum + before;
-      sum += total;
+      if (i < columns) values[row * columns + i] = saturating_sum(sum, before);
+      sum = saturating_sum(sum, total);
     }
     if (group.thread() == 0) totals[row] = sum;
   }
@@ -102,7 +110,7 @@ struct AddToRows {
   PHOTOSLAM_DEVICE void operator()(Group& group, Shared&) const {
     const uint32_t row = static_cast<uint32_t>(group.block());
     for (uint32_t i = static_cast<uint32_t>(group.thread()); i < columns; i += kSortThreads)
-      values[row * columns + i] += offsets[row];
+      values[row * columns + i] = saturating_sum(values[row * columns + i], offsets[row]);
   }
 };
 

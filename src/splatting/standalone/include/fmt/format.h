@@ -12,7 +12,7 @@
 namespace fmt {
 
 template <class... Args>
-using format_string = std::string_view;
+using format_string = std::string_view;  // NOLINT(readability-identifier-naming): fmt's name
 
 template <class... Args>
 std::string format(std::string_view text, const Args&... args) {

@@ -105,7 +105,7 @@ inline int run_all(int argc, char** argv) {
     if (condition)                               \
       ;                                          \
     else                                         \
-      action tiny_test::Report{__FILE__, __LINE__} = tiny_test::Message() << "not so: " << text << " "
+      action tiny_test::Report{__FILE__, __LINE__} = tiny_test::Message() << "not so: " << (text) << " "
 
 #define EXPECT_TRUE(a) TINY_TEST_CHECK(static_cast<bool>(a), #a, )
 #define EXPECT_FALSE(a) TINY_TEST_CHECK(!static_cast<bool>(a), "not " #a, )
