@@ -54,6 +54,7 @@ GeometryMapper::GeometryMapper(const GeometryMapperOptions& options, const OrbOp
       projector_(orb, camera, bf) {}
 
 GeometryUpdate GeometryMapper::process(const KeyframeProposal& proposal, const std::function<bool()>& interrupted) {
+  const auto change = begin_change();
   GeometryUpdate update;
   update.keyframe = proposal.id;
   insert(proposal);
@@ -68,6 +69,7 @@ GeometryUpdate GeometryMapper::process(const KeyframeProposal& proposal, const s
 }
 
 std::shared_ptr<const MapSnapshot> GeometryMapper::correct(const MapCorrection& correction) {
+  const auto change = begin_change();
   map_.apply(correction);
   // Landmarks may have been fused since the correction was computed, or by the duplicate before.
   for (const auto& [landmark, keyframe] : correction.wrong_observations) {
@@ -84,7 +86,13 @@ std::shared_ptr<const MapSnapshot> GeometryMapper::correct(const MapCorrection& 
   return map_.snapshot();
 }
 
+void GeometryMapper::append(const GeometryMapper& other) {
+  const auto change = begin_change();
+  map_.append(other.map_);
+}
+
 void GeometryMapper::serialize(Archive& archive) {
+  wholeness_.check(kName);
   map_.serialize(archive, camera_.width, camera_.height);
   archive(recent_landmarks_);
 }

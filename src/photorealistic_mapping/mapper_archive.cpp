@@ -58,6 +58,7 @@ void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
 }
 
 void PhotorealisticMapper::serialize(Archive& a) {
+  wholeness_.check(kName);
   uint64_t num_views = views_.size();
   a(random_, schedule_, model_, anchors_from_world_, anchor_scales_, scene_depth_, iteration_, training_psnr_,
     num_corrections_, num_views);

@@ -8,6 +8,7 @@
 
 #include "base/executor.h"
 #include "base/options.h"
+#include "base/wholeness.h"
 #include "image/pyramid.h"
 #include "map/snapshot.h"
 #include "photorealistic_mapping/densification.h"
@@ -126,8 +127,10 @@ class PhotorealisticMapper {
   FrozenMap freeze() const;
 
   /// Writes everything that training has come to, or continues from where it was written: with the same options the
-  /// next iterations are those that would have followed.
+  /// next iterations are those that would have followed. Throws when the map is not whole.
   void serialize(Archive& archive);
+  /// False once an exception has left a change half made: such a map is neither written nor changed any more.
+  bool is_whole() const { return wholeness_.is_whole(); }
 
  private:
   /// A keyframe as training material, while its pictures are within the budget.
@@ -142,6 +145,8 @@ class PhotorealisticMapper {
     void drop_images();
   };
 
+  static constexpr const char* kName = "the photorealistic map";
+  Wholeness::Change begin_change() { return {wholeness_, kName}; }
   SE3 view_from_world(size_t view) const;
   splatting::RenderOptions render_options() const;
   splatting::TrainOptions train_options(std::optional<double> progress) const;
@@ -161,6 +166,7 @@ class PhotorealisticMapper {
 
   PhotorealisticOptions options_;
   MapperSensor sensor_;
+  Wholeness wholeness_;
   Random random_;
   KeyframeSchedule schedule_;
   splatting::GaussianModel model_;

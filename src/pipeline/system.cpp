@@ -18,6 +18,7 @@
 #include "pipeline/localization_worker.h"
 #include "pipeline/mapping_worker.h"
 #include "pipeline/session_file.h"
+#include "pipeline/session_maps.h"
 #include "pipeline/stage.h"
 
 namespace photoslam {
@@ -152,9 +153,8 @@ std::shared_ptr<const MapSnapshot> Session::load_session() {
   const Status fits = check_session_sensor(header, localization_.camera(), localization_.bf());
   PHOTOSLAM_CHECK(fits.ok(), "{}", fits.error().message);
   reader(geometry_, mapping_.mapper());
-  PHOTOSLAM_CHECK(geometry_.map().num_keyframes() == mapping_.mapper().num_keyframes(),
-                  "the session has gaussians for {} of {} keyframes: begin a new one",
-                  mapping_.mapper().num_keyframes(), geometry_.map().num_keyframes());
+  const Status whole = check_session_maps(geometry_, mapping_.mapper());
+  PHOTOSLAM_CHECK(whole.ok(), "the session cannot be continued: {}; begin a new one", whole.error().message);
   auto map = geometry_.snapshot();
   loop_closer_.resume(*map);
   localization_.resume(static_cast<int>(map->keyframes.size()), next_free_place(*map));
@@ -170,22 +170,22 @@ std::shared_ptr<Archive> Session::begin_session() {
   return session;
 }
 
-/// After all stages have ended. A session whose two maps do not fit could not be continued; an older one can.
+/// After all stages have ended. A session whose maps are no pair could not be continued; an older one can.
 void Session::save_session() {
   if (settings_.session_file.empty() || settings_.localize_only || !mapping_.mapper().has_keyframes()) return;
-  const size_t placed = geometry_.map().num_keyframes(), drawn = mapping_.mapper().num_keyframes();
-  if (placed != drawn) {
-    failures_.report("session", fmt::format("{} is left as it is: gaussians for {} of {} keyframes only",
-                                            settings_.session_file.string(), drawn, placed));
-    return;
-  }
+  std::string problem;
   try {
-    if (const Status status = mapping_.save(*begin_session()); !status) {
-      failures_.report("session", status.error().message);
+    if (const Status maps = check_session_maps(geometry_, mapping_.mapper()); !maps) {
+      problem = fmt::format("{} is left as it is: {}", settings_.session_file.string(), maps.error().message);
+    } else if (const Status saved = mapping_.save(*begin_session()); !saved) {
+      problem = saved.error().message;
     }
   } catch (const std::exception& e) {
-    failures_.report("session", e.what());
+    problem = fmt::format("{} is left as it is: {}", settings_.session_file.string(), e.what());
   }
+  if (problem.empty()) return;
+  if (!failures_.text().empty()) outcome_.messages.push_back("session: " + problem);  // the cause is told already
+  failures_.report("session", problem);
 }
 
 /// While frames arrive: asks for it, and waits for nothing.
@@ -488,7 +488,7 @@ RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress)
   outcome_.seconds_total = clock_.seconds();
   outcome_.interrupted = outer_stop_.stop_requested();
   outcome_.failure = failures_.text();
-  outcome_.messages = autosave_.take_failures();
+  for (std::string& message : autosave_.take_failures()) outcome_.messages.push_back(std::move(message));
   return std::move(outcome_);
 }
 
