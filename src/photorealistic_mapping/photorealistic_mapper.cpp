@@ -319,6 +319,12 @@ void PhotorealisticMapper::add_gaussians(std::span<const splatting::Gaussian> in
   std::vector<splatting::Gaussian> in_anchor;
   for (const splatting::Gaussian& g : in_world) in_anchor.push_back(transform(g, anchor_from_world, rotation));
   model_.add(0, in_anchor, 0, static_cast<uint32_t>(iteration_));
+  keep_gaussian_budget();
+}
+
+size_t PhotorealisticMapper::keep_gaussian_budget() {
+  const auto change = begin_change();
+  return keep_budget(options_.densification, model_);
 }
 
 void PhotorealisticMapper::append(PhotorealisticMapper other) {
@@ -329,6 +335,7 @@ void PhotorealisticMapper::append(PhotorealisticMapper other) {
   std::ranges::move(other.views_, std::back_inserter(views_));
   model_.append(other.model_);
   schedule_.append(other.schedule_);
+  keep_gaussian_budget();
   if (has_keyframes()) keep_image_budget();
 }
 

@@ -103,11 +103,15 @@ class PhotorealisticMapper {
   void add_keyframe(const MapSnapshot& map, KeyframeId id, const KeyframeImages& images, Executor& executor,
                     const std::optional<splatting::Exposure>& exposure = {});
 
-  /// Adds gaussians from elsewhere, given in the world frame, to the first keyframe; there must be one.
+  /// Adds gaussians from elsewhere, given in the world frame, to the first keyframe; there must be one. As in append(),
+  /// what is too much for the budget goes.
   void add_gaussians(std::span<const splatting::Gaussian> in_world);
 
   /// Adds all that another mapper has come to, its keyframes counted on from those of this one.
   void append(PhotorealisticMapper other);
+
+  /// Removes what exceeds max_gaussians, as after loading a map that was made with a larger budget. Returns how many.
+  size_t keep_gaussian_budget();
 
   /// One training iteration, Eq. (4). At least one keyframe is needed. `progress` in [0, 1] says how much of the
   /// refinement is done; empty while frames arrive.

@@ -259,6 +259,35 @@ TEST_F(PhotorealisticMapperTest, ContinuesFromAnArchiveAsIfNothingHadHappened) {
   EXPECT_EQ(mapper.gaussians().size(), loaded.gaussians().size());
 }
 
+TEST_F(PhotorealisticMapperTest, ThereAreNeverMoreGaussiansThanTheBudgetAllows) {
+  constexpr size_t kBudget = 700;
+  const MapperSensor sensor{.camera = kCamera, .stereo_baseline_m = kBaseline};
+  PhotorealisticOptions options;
+  options.densification.max_gaussians = kBudget;
+  PhotorealisticMapper mapper(options, sensor, 1), other(options, sensor, 2);
+  add(mapper, at(0), stereo(at(0)));
+  EXPECT_EQ(mapper.gaussians().size(), kBudget) << "as many cells would like to have one";
+  world_ = testing::WallWithKeyframes(kCamera);
+  count_ = 0;
+  add(other, at(0.3), stereo(at(0.3)));
+  mapper.append(std::move(other));
+  EXPECT_EQ(mapper.gaussians().size(), kBudget);
+  for (const int anchor : {0, 1}) EXPECT_GT(mapper.gaussians().size(anchor), kBudget / 4) << "both give way";
+  const std::vector<splatting::Gaussian> more(50, mapper.gaussians().get(0));
+  mapper.add_gaussians(more);
+  EXPECT_EQ(mapper.gaussians().size(), kBudget);
+
+  Archive saved;
+  mapper.serialize(saved);
+  options.densification.max_gaussians = 400;
+  PhotorealisticMapper smaller(options, sensor, 1);
+  Archive reader(saved.bytes());
+  smaller.serialize(reader);
+  EXPECT_EQ(smaller.keep_gaussian_budget(), kBudget - 400);
+  EXPECT_EQ(smaller.gaussians().size(), 400u);
+  EXPECT_EQ(smaller.keep_gaussian_budget(), 0u);
+}
+
 TEST_F(PhotorealisticMapperTest, ForgetsPicturesBeyondTheBudgetAndGoesOn) {
   const MapperSensor sensor{.camera = kCamera, .stereo_baseline_m = kBaseline};
   PhotorealisticOptions options;

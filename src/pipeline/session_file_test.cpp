@@ -113,6 +113,28 @@ TEST_F(SessionTest, GoesOnMappingWhereTheOtherEnded) {
   EXPECT_GT(read_session(folder / "longer")->size(), bytes->size());
 }
 
+TEST_F(SessionTest, ASmallerBudgetOfGaussiansHoldsForTheLoadedMap) {
+  const auto budget = static_cast<int>(first->final.gaussians.size() / 2);
+  SystemOptions options;
+  options.pipeline.iterations_per_frame = 1;
+  options.photorealistic_mapping.densification.max_gaussians = budget;
+  for (const int num_frames : {0, 20}) {
+    CornerSource source(num_frames);
+    source.start_at = 50;
+    const RunOutcome outcome = run_slam(options, continuing("smaller"), source);
+    EXPECT_EQ(outcome.failure, "");
+    EXPECT_GT(outcome.final.gaussians.size(), 0u);
+    EXPECT_LE(outcome.final.gaussians.size(), static_cast<size_t>(budget)) << num_frames << " frames";
+    ASSERT_EQ(outcome.messages.size(), 1u);
+    EXPECT_NE(outcome.messages[0].find("max_gaussians"), std::string::npos);
+  }
+  RunSettings localize = continuing("");
+  localize.localize_only = true;
+  CornerSource source(12);
+  EXPECT_EQ(run_slam(options, localize, source).final.gaussians.size(), first->final.gaussians.size())
+      << "it is left as it is";
+}
+
 TEST_F(SessionTest, IsThereBeforeTrainingBegins) {
   RunSettings at_once = continuing("");
   at_once.deterministic = false;

@@ -88,6 +88,7 @@ class Session {
   void look_for_loops();
   void close_remaining_loops();
   std::shared_ptr<const MapSnapshot> load_session();
+  void drop_gaussians_beyond_budget();
   std::shared_ptr<Archive> begin_session();
   void save_session();
   void save_if_due();
@@ -108,6 +109,7 @@ class Session {
   std::stop_callback<std::function<void()>> forward_stop_;
   FailureReport failures_;
   Stopwatch clock_;
+  RunOutcome outcome_;
 
   ThreadPool executor_;
   LocalizationWorker localization_;
@@ -137,8 +139,6 @@ class Session {
   std::vector<Vec3> shown_positions_;
   size_t num_shown_ = 0;
 
-  RunOutcome outcome_;
-
   Stage<MappingMessage> mapping_stage_;
   Stage<GeometryMessage> geometry_stage_;
   Stage<LoopMessage> loop_stage_;
@@ -155,11 +155,21 @@ std::shared_ptr<const MapSnapshot> Session::load_session() {
   reader(geometry_, mapping_.mapper());
   const Status whole = check_session_maps(geometry_, mapping_.mapper());
   PHOTOSLAM_CHECK(whole.ok(), "the session cannot be continued: {}; begin a new one", whole.error().message);
+  if (!settings_.localize_only) drop_gaussians_beyond_budget();
   auto map = geometry_.snapshot();
   loop_closer_.resume(*map);
   localization_.resume(static_cast<int>(map->keyframes.size()), next_free_place(*map));
   mapping_.gaussians = mapping_.mapper().gaussians().size();
   return map;
+}
+
+/// The loaded map may have been made with a larger budget.
+void Session::drop_gaussians_beyond_budget() {
+  const size_t dropped = mapping_.mapper().keep_gaussian_budget();
+  if (dropped == 0) return;
+  outcome_.messages.push_back(
+      fmt::format("{} gaussians of the loaded map are gone: photorealistic_mapping.densification.max_gaussians is {}",
+                  dropped, options_.photorealistic_mapping.densification.max_gaussians));
 }
 
 /// Header and geometric map; the photorealistic map follows.
