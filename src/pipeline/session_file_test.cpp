@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/session_file.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 #include <unistd.h>
 
 #include <cstring>
@@ -15,7 +15,13 @@
 namespace photoslam {
 namespace {
 
+using ::testing::AllOf;
 using testing::CornerSource;
+using ::testing::ElementsAre;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using ::testing::UnorderedElementsAre;
 
 /// A walk of 60 frames, saved as a session.
 class SessionTest : public ::testing::Test {
@@ -133,6 +139,22 @@ TEST_F(SessionTest, ASmallerBudgetOfGaussiansHoldsForTheLoadedMap) {
   CornerSource source(12);
   EXPECT_EQ(run_slam(options, localize, source).final.gaussians.size(), first->final.gaussians.size())
       << "it is left as it is";
+}
+
+TEST_F(SessionTest, TellsWhichOptionsDifferFromThoseItWasMadeWith) {
+  SystemOptions options;
+  options.pipeline.iterations_per_frame = 1;
+  SessionHeader header = session_header(*bytes);
+  EXPECT_TRUE(describe_changed_options(header, options).empty());
+  options.localization.min_inliers = 33;
+  options.features.num_levels = 5;
+  header.configuration += "[retired]\nstep = 0.5\n";
+  EXPECT_THAT(describe_changed_options(header, options),
+              UnorderedElementsAre(AllOf(StartsWith("localization.min_inliers = 33 applies"), EndsWith("had 20")),
+                                   AllOf(StartsWith("features.num_levels = 5 applies"), HasSubstr("had 8; landmarks")),
+                                   AllOf(StartsWith("retired.step = 0.5 in the session"), EndsWith("ignored"))));
+  header.configuration = "no [ TOML";
+  EXPECT_THAT(describe_changed_options(header, options), ElementsAre(HasSubstr("cannot be compared")));
 }
 
 TEST_F(SessionTest, IsThereBeforeTrainingBegins) {
