@@ -52,7 +52,7 @@ void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
     view = &views_.emplace_back();
     if (!color.empty()) set_images(color, depth, sensor_.mask, *view);
   }
-  a(view->adjustment, view->exposure);
+  a(view->adjustment, view->exposure, view->exposure_is_known);
   if (depth.empty()) serialize_image(a, view->picture.depth);  // otherwise it follows from the depth image
   serialize_image(a, view->right);
 }

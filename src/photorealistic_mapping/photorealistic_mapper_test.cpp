@@ -259,6 +259,52 @@ TEST_F(PhotorealisticMapperTest, ContinuesFromAnArchiveAsIfNothingHadHappened) {
   EXPECT_EQ(mapper.gaussians().size(), loaded.gaussians().size());
 }
 
+/// Keyframes, all but the first of a known exposure, and corrections, before and after an archive: nothing tells that
+/// there was one.
+TEST_F(PhotorealisticMapperTest, ContinuesFromAnArchiveThroughCorrectionsAsIfNothingHadHappened) {
+  const MapperSensor sensor{.camera = kCamera, .stereo_baseline_m = kBaseline};
+  PhotorealisticOptions options;
+  options.reseed_interval = 1;  // also in keyframes that no iteration has used yet
+  const splatting::Exposure known{{0.5f, 0.6f, 0.7f}, {0, 0, 0}};
+  PhotorealisticMapper mapper(options, sensor, 1);
+  add(mapper, at(0), stereo(at(0)));
+  for (int i = 0; i < 40; ++i) mapper.train({}, executor_);
+  const auto correct = [&](double x) {
+    const Sim3 stay, move(SE3(so3_exp(Vec3(0, 0.02, 0)), Vec3(x, 0, 0)));
+    MapCorrection correction;
+    correction.new_world_from_old_world.assign(static_cast<size_t>(count_), move);
+    correction.new_world_from_old_world[0] = stay;
+    world_.apply(correction);
+  };
+  for (const double x : {0.1, 0.2, 0.3, 0.6}) add(mapper, at(x), stereo(at(x)), 0.9, known);
+  correct(0.05);
+  mapper.update_poses(*world_.snapshot());
+  ASSERT_TRUE(mapper.has_seams());
+
+  Archive saved;
+  mapper.serialize(saved);
+  PhotorealisticMapper loaded(options, sensor, 99);
+  Archive reader(saved.bytes());
+  loaded.serialize(reader);
+  correct(-0.03);
+  world_.add(at(0.9));
+  KeyframeImages images = stereo(at(0.9));
+  images.color = to_rgb(world_.picture(at(0.9)));
+  std::vector<std::string> ends;
+  for (PhotorealisticMapper* m : {&mapper, &loaded}) {
+    for (int i = 0; i < 8; ++i) m->train({}, executor_);
+    m->update_poses(*world_.snapshot());
+    for (int i = 0; i < 8; ++i) m->train({}, executor_);
+    m->add_keyframe(*world_.snapshot(), KeyframeId(5), images, executor_);
+    for (int i = 0; i < 12; ++i) m->train({}, executor_);
+    for (int i = 0; i < 5; ++i) m->train(0.1 * i, executor_);
+    Archive end;
+    m->serialize(end);
+    ends.push_back(end.take_bytes());
+  }
+  EXPECT_TRUE(ends[0] == ends[1]);
+}
+
 TEST_F(PhotorealisticMapperTest, ThereAreNeverMoreGaussiansThanTheBudgetAllows) {
   constexpr size_t kBudget = 700;
   const MapperSensor sensor{.camera = kCamera, .stereo_baseline_m = kBaseline};

@@ -19,7 +19,7 @@
 namespace photoslam {
 namespace {
 
-constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 7, .oldest = 7};
+constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 8, .oldest = 8};
 
 /// Lets deflate or inflate work through the input; their counts have 32 bits.
 template <class Step>
