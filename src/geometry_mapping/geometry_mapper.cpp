@@ -16,7 +16,8 @@ namespace photoslam {
 namespace {
 
 constexpr int kMinCovisible = 15;
-constexpr int kTrialKeyframes = 3;  // a young landmark must prove itself over this many keyframes
+constexpr int kMinBundleIterations = 2;  // also when the next keyframe is waiting
+constexpr int kTrialKeyframes = 3;       // a young landmark must prove itself over this many keyframes
 
 /// 95 % of χ² with two or, with depth, three degrees of freedom.
 double max_chi2(const PixelObservation& observation) { return observation.has_depth() ? 7.815 : 5.991; }
@@ -362,7 +363,10 @@ BundleSummary GeometryMapper::adjust_locally(KeyframeId id, const std::function<
                                              std::vector<KeyframeId>& moved) {
   if (map_.num_keyframes() < 2) return {};
   build_local_problem(id);
-  const BundleSummary summary = adjuster_.solve(options_.bundle, camera_, bf_, problem_, interrupted);
+  const auto may_stop = [&interrupted, iterations = 0]() mutable {
+    return iterations++ >= kMinBundleIterations && interrupted && interrupted();
+  };
+  const BundleSummary summary = adjuster_.solve(options_.bundle, camera_, bf_, problem_, may_stop);
   for (size_t i = 0; i < problem_keyframes_.size(); ++i) {
     if (problem_.pose_is_fixed[i]) continue;
     map_.set_pose(problem_keyframes_[i], problem_.camera_from_world[i]);

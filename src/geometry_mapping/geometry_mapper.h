@@ -56,7 +56,7 @@ class GeometryMapper {
   bool is_whole() const { return wholeness_.is_whole(); }
 
   /// Adds the keyframe, culls and creates landmarks, fuses duplicates, adjusts, publishes. `interrupted` (asked between
-  /// iterations) ends the adjustment early.
+  /// iterations, after the first two) ends the adjustment early.
   GeometryUpdate process(const KeyframeProposal& proposal, const std::function<bool()>& interrupted = {});
 
   /// Takes over what loop closure found: moves the map, fuses what is double, publishes.

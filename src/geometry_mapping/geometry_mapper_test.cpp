@@ -214,6 +214,23 @@ TEST_F(WalkTest, TheSameInputGivesTheSameMap) {
   }
 }
 
+TEST_F(WalkTest, AdjustmentBeginsEvenWhenTheNextKeyframeIsWaiting) {
+  PointWorld world;
+  world.pixel_noise = 1;
+  walk(world, 90);
+  GeometryMapper hurried({}, {}, world.camera, world.bf);
+  int num_interrupted = 0;
+  for (const KeyframeProposal& proposal : proposals) {
+    const GeometryUpdate update = hurried.process(proposal, [] { return true; });
+    if (hurried.map().num_keyframes() < 2) continue;
+    EXPECT_LT(update.bundle.final_cost, update.bundle.initial_cost);
+    if (!update.bundle.interrupted) continue;  // it has converged before
+    ++num_interrupted;
+    EXPECT_EQ(update.bundle.iterations, 2);
+  }
+  EXPECT_GT(num_interrupted, 0);
+}
+
 /// The keyframes of a walk, with corrections between them, in one go and by way of an archive in the middle.
 TEST_F(WalkTest, ContinuesFromAnArchiveThroughCorrectionsAsIfNothingHadHappened) {
   PointWorld world;
