@@ -65,9 +65,9 @@ void FrameFeed::read_all() {
           pace_ == Pace::realtime ? early_.push({std::move(*frame), now}) : release(std::move(*frame), now);
       if (!taken) break;
     }
-  } catch (const std::exception& e) {
+  } catch (...) {
     std::lock_guard lock(mutex_);
-    failure_ = e.what();
+    failure_ = exception_text();
   }
   early_.close();
   if (pace_ != Pace::realtime) finish();

@@ -130,5 +130,18 @@ TEST_F(FrameFeedTest, AFailingSourceStopsTheRunAndIsNamed) {
   EXPECT_TRUE(stop_.stop_requested());
 }
 
+class ThrowsANumber final : public EmptyFrames {
+ public:
+  ThrowsANumber() : EmptyFrames(3, 1) {}
+  std::optional<Frame> next() override { throw 42; }
+};
+
+TEST_F(FrameFeedTest, WhateverASourceThrowsIsReported) {
+  ThrowsANumber source;
+  FrameFeed feed(source, Pace::asap, 3, true, stop_.get_token(), failures_);
+  EXPECT_TRUE(take_all(feed).empty());
+  EXPECT_TRUE(failures_.text().starts_with("input: ")) << failures_.text();
+}
+
 }  // namespace
 }  // namespace photoslam

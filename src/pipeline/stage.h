@@ -14,6 +14,17 @@
 
 namespace photoslam {
 
+/// What the exception that is being handled says.
+inline std::string exception_text() {
+  try {
+    throw;
+  } catch (const std::exception& e) {
+    return e.what();
+  } catch (...) {
+    return "something was thrown that is no std::exception and does not say what has failed";
+  }
+}
+
 /// The first component that threw, and what it said. Reporting a failure asks the whole pipeline to stop.
 class FailureReport {
  public:
@@ -76,7 +87,7 @@ class Stage {
 
  private:
   void loop() {
-    if (work_.on_start) work_.on_start();
+    if (work_.on_start) guarded(work_.on_start);
     while (true) {
       std::optional<Message> message = queue_.try_pop();
       if (!message) {
@@ -96,9 +107,9 @@ class Stage {
     if (failed_) return;
     try {
       function();
-    } catch (const std::exception& e) {
+    } catch (...) {
       failed_ = true;
-      failures_.report(work_.name, e.what());
+      failures_.report(work_.name, exception_text());
     }
   }
 

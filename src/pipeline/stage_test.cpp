@@ -46,6 +46,16 @@ TEST_P(StageTest, AThrowingComponentIsNamedAndStopsThePipelineWithoutBlockingIt)
   EXPECT_EQ(failures.text(), "geometry mapping: broken map");
 }
 
+TEST_P(StageTest, WhateverIsThrownIsReported) {
+  Stage<int> stage(2, GetParam(), {.name = "mapping", .handle = [](int i) { throw i; }}, failures);
+  stage.post(1);
+  stage.post(2);
+  stage.finish();
+  EXPECT_TRUE(stop.stop_requested());
+  EXPECT_TRUE(failures.text().starts_with("mapping: ")) << failures.text();
+  EXPECT_NE(failures.text().find("no std::exception"), std::string::npos) << failures.text();
+}
+
 INSTANTIATE_TEST_SUITE_P(Threading, StageTest, ::testing::Bool(),
                          [](const auto& suite) { return suite.param ? "OwnThread" : "Inline"; });
 

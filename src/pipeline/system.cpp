@@ -190,8 +190,8 @@ void Session::save_session() {
     } else if (const Status saved = mapping_.save(*begin_session()); !saved) {
       problem = saved.error().message;
     }
-  } catch (const std::exception& e) {
-    problem = fmt::format("{} is left as it is: {}", settings_.session_file.string(), e.what());
+  } catch (...) {
+    problem = fmt::format("{} is left as it is: {}", settings_.session_file.string(), exception_text());
   }
   if (problem.empty()) return;
   if (!failures_.text().empty()) outcome_.messages.push_back("session: " + problem);  // the cause is told already
@@ -366,15 +366,15 @@ void Session::localize_all(const std::function<void()>& after_each_frame) {
       localize(std::move(*fed));
       after_each_frame();
     }
-  } catch (const std::exception& e) {
-    failures_.report("localization", e.what());
+  } catch (...) {
+    failures_.report("localization", exception_text());
   }
   geometry_stage_.finish();
   loop_stage_.finish();
   try {
     close_remaining_loops();
-  } catch (const std::exception& e) {
-    failures_.report("loop closure", e.what());
+  } catch (...) {
+    failures_.report("loop closure", exception_text());
   }
   frame_number_ = std::numeric_limits<int>::max();
   receive_due_updates();
@@ -419,8 +419,8 @@ void Session::tell(const std::function<void(const Progress&)>& on_progress, cons
   if (!on_progress) return;
   try {
     on_progress(progress);
-  } catch (const std::exception& e) {
-    failures_.report("progress report", e.what());
+  } catch (...) {
+    failures_.report("progress report", exception_text());
   }
 }
 
@@ -437,8 +437,8 @@ void Session::refine(const std::function<void(const Progress&)>& on_progress) {
     try {
       mapping_.refine(done);
       if (autosave_.begin()) autosave_.ended(mapping_.save(*begin_session()));
-    } catch (const std::exception& e) {
-      failures_.report("photorealistic mapping", e.what());
+    } catch (...) {
+      failures_.report("photorealistic mapping", exception_text());
       break;
     }
     if (elapsed - last_report < 1e-3 * static_cast<double>(kProgressInterval.count())) continue;

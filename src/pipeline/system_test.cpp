@@ -193,6 +193,12 @@ TEST(RunSlam, AListenerThatThrowsEndsTheRunWithEverythingMadeSoFar) {
   }
 }
 
+TEST(RunSlam, AListenerMayThrowAnything) {
+  CornerSource source(20);
+  const RunOutcome outcome = run_slam({}, deterministic(2), source, {}, [](const Progress&) { throw 42; });
+  EXPECT_TRUE(outcome.failure.starts_with("progress report: ")) << outcome.failure;
+}
+
 TEST(RunSlam, ThePreviewShowsThePathSoFar) {
   for (const int threads : {1, 2}) {
     RunSettings settings = deterministic(threads);
