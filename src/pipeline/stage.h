@@ -57,19 +57,27 @@ class Stage {
     std::function<void(Message)> handle;
     std::function<bool()> idle = {};      ///< Called while nothing waits; false: nothing to do until a message comes.
     std::function<void()> on_start = {};  ///< Runs first on the stage's thread.
+    /// With this, posters never wait: the queue grows, but what waits last is forgotten when a newer message replaces
+    /// it.
+    std::function<bool(const Message& newer, const Message& last)> replaces = {};
   };
 
   Stage(size_t capacity, bool threaded, Work work, FailureReport& failures)
-      : queue_(capacity, Overflow::block), work_(std::move(work)), failures_(failures), threaded_(threaded) {
+      : queue_(capacity, work.replaces ? Overflow::grow : Overflow::block),
+        work_(std::move(work)),
+        failures_(failures),
+        threaded_(threaded) {
     if (threaded_) thread_ = std::thread([this] { loop(); });
   }
   ~Stage() { finish(); }
   Stage(const Stage&) = delete;
   Stage& operator=(const Stage&) = delete;
 
-  /// Waits while the queue is full.
+  /// Waits while the queue is full, unless Work::replaces says otherwise.
   void post(Message message) {
-    if (threaded_) {
+    if (threaded_ && work_.replaces) {
+      queue_.push(std::move(message), work_.replaces);
+    } else if (threaded_) {
       queue_.push(std::move(message));
     } else {
       guarded([&] { work_.handle(std::move(message)); });
