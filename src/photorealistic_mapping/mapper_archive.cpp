@@ -36,7 +36,9 @@ void ExposureAdjustment::serialize(Archive& a) {
   a(steps_);
 }
 
-void KeyframeSchedule::serialize(Archive& a) { a(random_, uses_, losses_, active_, round_, revisits_); }
+void KeyframeSchedule::serialize(Archive& a) {
+  a(random_, uses_, losses_, active_, round_, revisits_, newest_came_last_);
+}
 
 void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
   ImageU8 color;
