@@ -336,13 +336,13 @@ void Session::receive_due_updates() {
 
 void Session::localize(FedFrame fed) {
   receive_due_updates();
-  // Frames the queue has dropped never came here.
+  // Frames that the device or the queue has dropped never came here.
   for (; next_frame_id_ < fed.frame.id.value; ++next_frame_id_) {
     FrameOutcome dropped;
     dropped.frame = FrameId(next_frame_id_);
     dropped.timestamp_ns = feed_.timestamp_ns(dropped.frame);
     dropped.dropped = true;
-    dropped.reason = "came too fast";
+    dropped.reason = feed_.was_read(dropped.frame) ? "came too fast" : "dropped by the camera";
     record(std::move(dropped));
   }
   next_frame_id_ = fed.frame.id.value + 1;
