@@ -291,8 +291,9 @@ Stage<MappingMessage>::Work Session::mapping_work() {
   work.handle = [this](const MappingMessage& message) { mapping_.handle(message); };
   if (!logical_time_ && !settings_.localize_only) work.idle = [this] { return mapping_.train_while_idle(); };
   work.on_start = in_background;
-  // Nothing that is tracked or placed waits for gaussians. A keyframe that waits for them keeps its pictures.
-  if (!logical_time_) work.replaces = replaces;
+  // At real-time pace nothing that is tracked or placed waits for gaussians. A keyframe that waits for them keeps its
+  // pictures in memory, so that where time plays no role the queue is bounded.
+  if (!logical_time_ && settings_.pace == Pace::realtime) work.replaces = replaces;
   return work;
 }
 
