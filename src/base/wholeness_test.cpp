@@ -21,24 +21,21 @@ TEST(Wholeness, ChangesThatEndLeaveItWhole) {
 
 TEST(Wholeness, AnExceptionLeavesHalfOfAChangeForGood) {
   Wholeness wholeness;
-  try {
+  const auto fail = [&] {
     const Wholeness::Change change(wholeness, "a map");
     throw std::runtime_error("no memory");
-  } catch (const std::runtime_error&) {
-  }
+  };
+  EXPECT_THROW(fail(), std::runtime_error);
   EXPECT_FALSE(wholeness.is_whole());
   EXPECT_THROW(wholeness.check("a map"), CheckError);
-  EXPECT_THROW(const Wholeness::Change again(wholeness, "a map"), CheckError);
+  EXPECT_THROW(fail(), CheckError) << "no change begins any more";
 }
 
 TEST(Wholeness, AnExceptionThatIsCaughtInsideAChangeHarmsNothing) {
   Wholeness wholeness;
   {
     const Wholeness::Change change(wholeness, "a map");
-    try {
-      throw std::runtime_error("a detail");
-    } catch (const std::runtime_error&) {
-    }
+    EXPECT_THROW(throw std::runtime_error("a detail"), std::runtime_error);
   }
   EXPECT_TRUE(wholeness.is_whole());
 }
@@ -51,11 +48,11 @@ struct Cleaner {
 
 TEST(Wholeness, AChangeMadeWhileAnExceptionGoesByIsWhole) {
   Wholeness wholeness;
-  try {
+  const auto fail_elsewhere = [&] {
     const Cleaner cleaner{wholeness};
     throw std::runtime_error("elsewhere");
-  } catch (const std::runtime_error&) {
-  }
+  };
+  EXPECT_THROW(fail_elsewhere(), std::runtime_error);
   EXPECT_TRUE(wholeness.is_whole());
 }
 
