@@ -528,6 +528,10 @@ class SessionTest(CommandLineTest):
         before = sha256(first / "session.photoslam")
         second = self.run_deterministic("second", "--load-map", first, "--localize-only")
         self.assertEqual(sha256(first / "session.photoslam"), before)
+        loaded = ("--load-map", first, "--localize-only", "--deterministic", "--output", self.folder / "third")
+        notes = photoslam("run", SEQUENCE, *loaded, "--set", "localization.min_inliers=21").stderr
+        self.assertIn("localization.min_inliers = 21 applies, the session had 20", notes)
+        self.assertNotIn("densification", notes)
         self.assertFalse((second / "session.photoslam").exists())
         frames = json.loads((second / "report.json").read_text(encoding="utf-8"))["frames"]
         self.assertEqual(frames["tracked"], frames["total"])

@@ -73,6 +73,9 @@ Status load_session(const fs::path& path, const SystemOptions& options, const So
   if (Status fits = check_session(*session, options, info); !fits) {
     return error("{}: {}", path.string(), fits.error().message);
   }
+  for (const std::string& line : describe_changed_options(session_header(*session), options)) {
+    fmt::print(stderr, "  note: {}\n", line);
+  }
   settings.loaded_session = std::make_shared<const std::string>(std::move(*session));
   return {};
 }

@@ -231,7 +231,12 @@ Status train(const TrainArguments& arguments) {
     mapper.add_keyframe(*map, KeyframeId(keyframe++), {input->images[i], {}, {}, input->mask(i)}, executor,
                         input->exposures[i]);
   }
+  const size_t num_wanted = mapper.gaussians().size() + start->size();
   mapper.add_gaussians(*start);
+  if (mapper.gaussians().size() < num_wanted) {
+    fmt::print(stderr, "  note: training begins with {} of {} gaussians: densification.max_gaussians allows no more\n",
+               mapper.gaussians().size(), num_wanted);
+  }
   train_until_done(arguments, interrupt.token(), executor, mapper);
 
   const FrozenMap trained = mapper.freeze();

@@ -15,6 +15,7 @@ namespace photoslam {
 enum class Overflow {
   block,        ///< push waits until there is room.
   drop_oldest,  ///< the oldest element makes room and is counted.
+  grow,         ///< nothing is lost and nobody waits: the capacity is where the queue begins.
 };
 
 /// First-in first-out channel between threads with a fixed capacity.
@@ -27,10 +28,20 @@ class BoundedQueue {
 
   /// False when the queue is closed; the value is then dropped.
   bool push(T value) {
+    return push(std::move(value), [](const T&, const T&) { return false; });
+  }
+
+  /// The same, but that the value takes the place of the newest element that waits if `replaces(value, newest)`.
+  template <class Replaces>
+  bool push(T value, const Replaces& replaces) {
     std::unique_lock lock(mutex_);
+    if (!closed_ && !items_.empty() && replaces(std::as_const(value), std::as_const(items_.back()))) {
+      items_.back() = std::move(value);
+      return true;
+    }
     if (overflow_ == Overflow::block) has_room_.wait(lock, [&] { return closed_ || items_.size() < capacity_; });
     if (closed_) return false;
-    if (items_.size() >= capacity_) {
+    if (overflow_ == Overflow::drop_oldest && items_.size() >= capacity_) {
       items_.pop_front();
       ++dropped_;
     }

@@ -30,6 +30,26 @@ TEST(BoundedQueue, BlockDeliversEverythingInOrder) {
   EXPECT_EQ(queue.dropped(), 0u);
 }
 
+TEST(BoundedQueue, GrowLosesNothingAndWaitsForNobody) {
+  BoundedQueue<int> queue(2, Overflow::grow);
+  for (int i = 0; i < 100; ++i) EXPECT_TRUE(queue.push(i));
+  EXPECT_EQ(queue.size(), 100u);
+  EXPECT_EQ(queue.dropped(), 0u);
+  for (int i = 0; i < 100; ++i) ASSERT_EQ(queue.pop(), i);
+}
+
+TEST(BoundedQueue, AValueTakesThePlaceOfTheNewestOneIfItIsToldTo) {
+  BoundedQueue<int> queue(2, Overflow::block);
+  const auto same_tens = [](int value, int newest) { return value / 10 == newest / 10; };
+  for (const int value : {11, 12, 21, 22, 23}) EXPECT_TRUE(queue.push(value, same_tens)) << "a full queue has room";
+  EXPECT_EQ(queue.pop(), 12);
+  EXPECT_EQ(queue.pop(), 23);
+  EXPECT_TRUE(queue.push(24, same_tens)) << "there is none to replace";
+  queue.close();
+  EXPECT_FALSE(queue.push(25, same_tens));
+  EXPECT_EQ(queue.pop(), 24);
+}
+
 TEST(BoundedQueue, CloseWakesABlockedProducerAndRefusesItsValue) {
   BoundedQueue<int> queue(1, Overflow::block);
   ASSERT_TRUE(queue.push(1));

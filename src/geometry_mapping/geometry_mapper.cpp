@@ -16,7 +16,8 @@ namespace photoslam {
 namespace {
 
 constexpr int kMinCovisible = 15;
-constexpr int kTrialKeyframes = 3;  // a young landmark must prove itself over this many keyframes
+constexpr int kMinBundleIterations = 2;  // also when the next keyframe is waiting
+constexpr int kTrialKeyframes = 3;       // a young landmark must prove itself over this many keyframes
 
 /// 95 % of χ² with two or, with depth, three degrees of freedom.
 double max_chi2(const PixelObservation& observation) { return observation.has_depth() ? 7.815 : 5.991; }
@@ -54,6 +55,7 @@ GeometryMapper::GeometryMapper(const GeometryMapperOptions& options, const OrbOp
       projector_(orb, camera, bf) {}
 
 GeometryUpdate GeometryMapper::process(const KeyframeProposal& proposal, const std::function<bool()>& interrupted) {
+  const auto change = begin_change();
   GeometryUpdate update;
   update.keyframe = proposal.id;
   insert(proposal);
@@ -68,6 +70,7 @@ GeometryUpdate GeometryMapper::process(const KeyframeProposal& proposal, const s
 }
 
 std::shared_ptr<const MapSnapshot> GeometryMapper::correct(const MapCorrection& correction) {
+  const auto change = begin_change();
   map_.apply(correction);
   // Landmarks may have been fused since the correction was computed, or by the duplicate before.
   for (const auto& [landmark, keyframe] : correction.wrong_observations) {
@@ -84,7 +87,13 @@ std::shared_ptr<const MapSnapshot> GeometryMapper::correct(const MapCorrection& 
   return map_.snapshot();
 }
 
+void GeometryMapper::append(const GeometryMapper& other) {
+  const auto change = begin_change();
+  map_.append(other.map_);
+}
+
 void GeometryMapper::serialize(Archive& archive) {
+  wholeness_.check(kName);
   map_.serialize(archive, camera_.width, camera_.height);
   archive(recent_landmarks_);
 }
@@ -354,7 +363,10 @@ BundleSummary GeometryMapper::adjust_locally(KeyframeId id, const std::function<
                                              std::vector<KeyframeId>& moved) {
   if (map_.num_keyframes() < 2) return {};
   build_local_problem(id);
-  const BundleSummary summary = adjuster_.solve(options_.bundle, camera_, bf_, problem_, interrupted);
+  const auto may_stop = [&interrupted, iterations = 0]() mutable {
+    return iterations++ >= kMinBundleIterations && interrupted && interrupted();
+  };
+  const BundleSummary summary = adjuster_.solve(options_.bundle, camera_, bf_, problem_, may_stop);
   for (size_t i = 0; i < problem_keyframes_.size(); ++i) {
     if (problem_.pose_is_fixed[i]) continue;
     map_.set_pose(problem_keyframes_[i], problem_.camera_from_world[i]);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/options.h"
+#include "base/wholeness.h"
 #include "geometry_mapping/keyframe_culling.h"
 #include "localization/landmark_projection.h"
 #include "localization/tracker.h"
@@ -48,12 +49,14 @@ class GeometryMapper {
   /// Continues with a map made before.
   void set_map(Map map) { map_ = std::move(map); }
   /// Adds another's map to this one's.
-  void append(const GeometryMapper& other) { map_.append(other.map_); }
-  /// Writes map and state, or replaces them by those read.
+  void append(const GeometryMapper& other);
+  /// Writes map and state, or replaces them by those read. Throws when the map is not whole.
   void serialize(Archive& archive);
+  /// False once an exception has left a change half made: such a map is neither written nor changed any more.
+  bool is_whole() const { return wholeness_.is_whole(); }
 
   /// Adds the keyframe, culls and creates landmarks, fuses duplicates, adjusts, publishes. `interrupted` (asked between
-  /// iterations) ends the adjustment early.
+  /// iterations, after the first two) ends the adjustment early.
   GeometryUpdate process(const KeyframeProposal& proposal, const std::function<bool()>& interrupted = {});
 
   /// Takes over what loop closure found: moves the map, fuses what is double, publishes.
@@ -80,10 +83,14 @@ class GeometryMapper {
   void remove_outliers();
   int cull_keyframes(KeyframeId current);
 
+  static constexpr const char* kName = "the geometric map";
+  Wholeness::Change begin_change() { return {wholeness_, kName}; }
+
   GeometryMapperOptions options_;
   PinholeCamera camera_;
   double bf_;
   Map map_;
+  Wholeness wholeness_;
   LandmarkProjector projector_;
   ProjectionMatcher matcher_;
   BundleAdjuster adjuster_;

@@ -7,6 +7,7 @@
 #include <functional>
 #include <numbers>
 
+#include "base/archive.h"
 #include "map/testing/point_world.h"
 #include "math/umeyama.h"
 
@@ -39,7 +40,8 @@ class WalkTest : public ::testing::Test {
       ASSERT_TRUE(result.has_pose) << "frame " << frame << ": " << result.reason;
       frames.push_back({truth, result.reference, result.camera_from_reference});
       if (!result.keyframe) continue;
-      updates.push_back(mapper->process(*result.keyframe));
+      proposals.push_back(*result.keyframe);
+      updates.push_back(mapper->process(proposals.back()));
       snapshot = updates.back().map;
     }
   }
@@ -86,6 +88,7 @@ class WalkTest : public ::testing::Test {
   std::optional<Tracker> tracker;
   std::optional<GeometryMapper> mapper;
   std::shared_ptr<const MapSnapshot> snapshot;
+  std::vector<KeyframeProposal> proposals;
   std::vector<GeometryUpdate> updates;
   std::vector<TrackedFrame> frames;
 };
@@ -209,6 +212,64 @@ TEST_F(WalkTest, TheSameInputGivesTheSameMap) {
     EXPECT_EQ(pose.translation, first[k].translation);
     EXPECT_EQ(pose.rotation.coeffs(), first[k].rotation.coeffs());
   }
+}
+
+TEST_F(WalkTest, AdjustmentBeginsEvenWhenTheNextKeyframeIsWaiting) {
+  PointWorld world;
+  world.pixel_noise = 1;
+  walk(world, 90);
+  GeometryMapper hurried({}, {}, world.camera, world.bf);
+  int num_interrupted = 0;
+  for (const KeyframeProposal& proposal : proposals) {
+    const GeometryUpdate update = hurried.process(proposal, [] { return true; });
+    if (hurried.map().num_keyframes() < 2) continue;
+    EXPECT_LT(update.bundle.final_cost, update.bundle.initial_cost);
+    if (!update.bundle.interrupted) continue;  // it has converged before
+    ++num_interrupted;
+    EXPECT_EQ(update.bundle.iterations, 2);
+  }
+  EXPECT_GT(num_interrupted, 0);
+}
+
+/// The keyframes of a walk, with corrections between them, in one go and by way of an archive in the middle.
+TEST_F(WalkTest, ContinuesFromAnArchiveThroughCorrectionsAsIfNothingHadHappened) {
+  PointWorld world;
+  world.pixel_noise = 0.5;
+  walk(world, 150);
+  ASSERT_GE(proposals.size(), 6u);
+  const auto make = [&] { return GeometryMapper({}, {}, world.camera, world.bf); };
+  const auto process = [&](GeometryMapper& m, size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) m.process(proposals[i]);
+  };
+  const auto correct = [](GeometryMapper& m, double x) {
+    MapCorrection correction;
+    for (size_t k = 0; k < m.map().num_keyframes(); ++k) {
+      const double share = static_cast<double>(k) / static_cast<double>(m.map().num_keyframes());
+      correction.new_world_from_old_world.emplace_back(
+          SE3(so3_exp(Vec3(0, 0.1 * x * share, 0)), Vec3(x * share, 0, 0)));
+    }
+    m.correct(correction);
+  };
+  GeometryMapper through = make(), before = make(), after = make();
+  const size_t middle = proposals.size() / 2;
+  for (GeometryMapper* m : {&through, &before}) {
+    process(*m, 0, middle);
+    correct(*m, 0.02);
+  }
+  Archive saved;
+  before.serialize(saved);
+  Archive reader(saved.bytes());
+  after.serialize(reader);
+  std::vector<std::string> ends;
+  for (GeometryMapper* m : {&through, &after}) {
+    process(*m, middle, middle + 2);
+    correct(*m, -0.01);
+    process(*m, middle + 2, proposals.size());
+    Archive end;
+    m->serialize(end);
+    ends.push_back(end.take_bytes());
+  }
+  EXPECT_TRUE(ends[0] == ends[1]);
 }
 
 TEST(GeometryMapper, CorrectsLandmarksThatWereFusedInBetween) {

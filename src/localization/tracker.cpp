@@ -158,7 +158,7 @@ TrackingResult Tracker::start_map(const std::shared_ptr<const FeatureFrame>& fra
       matches.point[i] = {LandmarkId{}, {initial.id, first_keypoint}, world_from_first * in_first};
       matches.matched[i] = 1;
     }
-    pending_.add(initial.id, initial.frame, KeyframeId{}, initial.camera_from_world, std::move(points));
+    pending_.add(initial.id, initial.frame, KeyframeId{}, initial.camera_from_world, 1.0, std::move(points));
     reference_ = initial.id;
     result.num_inliers = static_cast<int>(pair->points.size());
     result.camera_from_reference = pair->second_from_first;
@@ -175,6 +175,7 @@ TrackingResult Tracker::start_map(const std::shared_ptr<const FeatureFrame>& fra
   last_ = frame;
   last_matches_ = std::move(matches);
   last_camera_from_reference_ = SE3{};
+  last_reference_scale_ = 1.0;
   velocity_.reset();
   lost_frames_ = 0;
   return result;
@@ -206,6 +207,7 @@ TrackingResult Tracker::tracked(const std::shared_ptr<const FeatureFrame>& frame
   result.camera_from_world = camera_from_world;
   result.reference = reference_;
   result.camera_from_reference = camera_from_world * pose_of(reference_).inverse();
+  result.reference_scale = scale_of(reference_);
   result.num_features = static_cast<int>(frame->size());
   result.num_inliers = num_inliers;
   if (may_become_keyframe && keyframe_decision_.should_insert(frame->timestamp_ns, camera_from_world, num_inliers,
@@ -213,11 +215,20 @@ TrackingResult Tracker::tracked(const std::shared_ptr<const FeatureFrame>& frame
     result.keyframe = propose(frame, result, matches);
     result.reference = reference_;
     result.camera_from_reference = SE3{};
+    result.reference_scale = scale_of(reference_);
   }
   last_ = frame;
   last_matches_ = std::move(matches);
   last_camera_from_reference_ = result.camera_from_reference;
+  last_reference_scale_ = result.reference_scale;
   return result;
+}
+
+/// As the map knows it now: it follows its reference keyframe, and grows with it.
+SE3 Tracker::last_pose() const {
+  SE3 camera_from_reference = last_camera_from_reference_;
+  camera_from_reference.translation *= growth_since_last();
+  return camera_from_reference * pose_of(reference_);
 }
 
 /// Looks up what the map now knows of the points that the last frame saw.
@@ -233,6 +244,8 @@ void Tracker::resolve_last_matches() {
     }
     if (const LandmarkView* view = map_ ? map_->find(point.landmark) : nullptr) {
       point.position = view->position;
+    } else if (const auto seen = last_matches_.matched[i] ? pending_.point(point.same_as, map_.get()) : std::nullopt) {
+      point.position = *seen;
     } else if (!last_matches_.matched[i] || !point.same_as.keyframe.valid()) {
       last_matches_.matched[i] = 0;
       if (!(last_->depth[i] > 0)) continue;
@@ -248,7 +261,9 @@ bool Tracker::track_last_frame(const FeatureFrame& frame, SE3& camera_from_world
   camera_from_world = last_pose();
   if (velocity_) {
     const auto elapsed = static_cast<double>(frame.timestamp_ns - last_->timestamp_ns);
-    camera_from_world = SE3::exp(*velocity_ * elapsed) * camera_from_world;
+    Vec6 motion = *velocity_ * elapsed;
+    motion.head<3>() *= growth_since_last();
+    camera_from_world = SE3::exp(motion) * camera_from_world;
   }
   // Without a velocity the points near by may be far from where they were. Those far away would vouch for a camera at
   // rest: the most numerous consensus decides.
@@ -330,6 +345,7 @@ KeyframeProposal Tracker::propose(const std::shared_ptr<const FeatureFrame>& fra
   proposal.frame = frame;
   proposal.reference = reference_;
   proposal.camera_from_reference = reference_.valid() ? result.camera_from_reference : result.camera_from_world;
+  proposal.reference_scale = scale_of(reference_);
   proposal.landmarks.resize(frame->size());
   proposal.sightings = std::move(sightings_);
   sightings_.clear();
@@ -346,7 +362,8 @@ KeyframeProposal Tracker::propose(const std::shared_ptr<const FeatureFrame>& fra
           {keypoint, camera_.unproject(frame->observations[i].pixel, static_cast<double>(frame->depth[i]))});
     }
   }
-  pending_.add(proposal.id, frame, proposal.reference, proposal.camera_from_reference, std::move(points));
+  pending_.add(proposal.id, frame, proposal.reference, proposal.camera_from_reference, proposal.reference_scale,
+               std::move(points));
   reference_ = proposal.id;
   keyframe_decision_.inserted(frame->timestamp_ns, result.camera_from_world);
   return proposal;

@@ -43,6 +43,7 @@ struct TrackingResult {
   SE3 camera_from_world;  ///< As known now.
   KeyframeId reference;   ///< The final pose is camera_from_reference * the reference's final pose.
   SE3 camera_from_reference;
+  double reference_scale = 1.0;  ///< Keyframe::scale of the reference: the unit in which this is.
   int num_features = 0;
   int num_inliers = 0;
   std::optional<KeyframeProposal> keyframe;
@@ -78,7 +79,9 @@ class Tracker {
                          FrameMatches matches, int num_inliers, bool may_become_keyframe);
 
   SE3 pose_of(KeyframeId keyframe) const { return pending_.camera_from_world(keyframe, map_.get()); }
-  SE3 last_pose() const { return last_camera_from_reference_ * pose_of(reference_); }
+  double scale_of(KeyframeId keyframe) const { return pending_.scale(keyframe, map_.get()); }
+  double growth_since_last() const { return scale_of(reference_) / last_reference_scale_; }
+  SE3 last_pose() const;
   void resolve_last_matches();
   bool track_last_frame(const FeatureFrame& frame, SE3& camera_from_world);
   int track_local_map(const FeatureFrame& frame, SE3& camera_from_world, FrameMatches& matches);
@@ -99,7 +102,8 @@ class Tracker {
   std::shared_ptr<const FeatureFrame> last_;
   FrameMatches last_matches_;
   SE3 last_camera_from_reference_;
-  std::optional<Vec6> velocity_;  // twist per nanosecond between the last two frames
+  double last_reference_scale_ = 1.0;  // the unit of this, and of the velocity
+  std::optional<Vec6> velocity_;       // twist per nanosecond between the last two frames
   int lost_frames_ = 0;
 
   KeyframeId reference_;  // the newest proposal, even before the map knows it

@@ -134,6 +134,53 @@ TEST_F(TrackerTest, AKeyframeMayBeCulledBeforeItsPointsAreKnown) {
   EXPECT_LT(pose_error(after.camera_from_world, truth).position, 1e-4);
 }
 
+/// A single camera: a loop changes the scale of the map while a keyframe, and what was tracked by it, is on its way.
+TEST_F(TrackerTest, WhatIsPendingGrowsWithAMapThatIsCorrected) {
+  static constexpr double kGrowth = 1.7;
+  world.with_depth = false;
+  Tracker single({}, {}, world.camera, 0);
+  const auto truth = [](int frame) { return PointWorld::camera_from_world(frame / 30.0); };
+  for (const int frame : {0, 15}) {
+    const auto observed = world.observe(truth(frame), frame);
+    mapper.add(KeyframeId(frame / 15), observed, truth(frame), world.point_of_keypoint);
+  }
+  snapshot = mapper.snapshot();
+  single.resume(2, 1);
+  int frame = 15;
+  const auto track = [&](bool map_it) { return single.track(world.observe(truth(frame), frame), snapshot, map_it); };
+  TrackingResult result;
+  for (; !result.keyframe; ++frame) {
+    ASSERT_LT(frame, 90);
+    result = track(frame > 20);
+    ASSERT_TRUE(result.has_pose) << frame << ": " << result.reason;
+  }
+  const KeyframeProposal first = *result.keyframe;
+  const SE3 first_pose = truth(frame - 1);
+  for (int i = 0; i < 5; ++i, ++frame) ASSERT_TRUE(track(false).has_pose);
+
+  const Sim3 grow(kGrowth, Quat::Identity(), Vec3::Zero());
+  mapper.apply({.new_world_from_old_world = {grow, grow}});
+  snapshot = mapper.snapshot();
+  const auto grown = [](const SE3& pose) { return SE3(pose.rotation, kGrowth * pose.translation); };
+  result = {};
+  for (int i = 0; !result.keyframe; ++i, ++frame) {
+    ASSERT_LT(frame, 150);
+    result = track(i > 5);
+    ASSERT_TRUE(result.has_pose) << frame << ": " << result.reason;
+    EXPECT_LT(pose_error(result.camera_from_world, grown(truth(frame))).position, 1e-3) << frame;
+    if (result.keyframe) break;
+    EXPECT_EQ(result.reference, first.id) << "nothing was lost";
+    EXPECT_DOUBLE_EQ(result.reference_scale, kGrowth);
+    const SE3 final_pose = result.camera_from_reference * grown(first_pose);
+    EXPECT_LT(pose_error(final_pose, grown(truth(frame))).position, 1e-3) << frame;
+  }
+  EXPECT_EQ(first.reference_scale, 1.0);
+  EXPECT_DOUBLE_EQ(result.keyframe->reference_scale, kGrowth) << "so that it is not scaled twice";
+  const SE3 second_pose = result.keyframe->camera_from_reference * grown(first_pose);
+  EXPECT_LT(pose_error(second_pose, grown(truth(frame))).position, 1e-3);
+  EXPECT_DOUBLE_EQ(result.reference_scale, 1.0) << "it is born in the unit of today";
+}
+
 TEST_F(TrackerTest, HeldOutFramesNeverBecomeKeyframes) {
   step(0, PointWorld::camera_from_world(0));
   for (int frame = 1; frame < 60; ++frame) {

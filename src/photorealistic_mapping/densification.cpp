@@ -28,6 +28,29 @@ DensityRules idle_rules(const DensificationOptions& options) {
   return rules;
 }
 
+/// Opacity times solid angle [sr], up to a factor; -1 where something is not finite.
+double presence(const splatting::Gaussian& g) {
+  double distance2 = 0, log_scales = 0, least = std::numeric_limits<double>::infinity();
+  for (const float m : g.mean) distance2 += static_cast<double>(m) * static_cast<double>(m);
+  for (const float s : g.log_scale) {
+    log_scales += static_cast<double>(s);
+    least = std::min(least, static_cast<double>(s));
+  }
+  const double area = std::exp(log_scales - least);  // of the two larger extents
+  const double opacity = 1.0 / (1.0 + std::exp(-static_cast<double>(g.opacity_logit)));
+  const double result = opacity * area / std::max(distance2, 1e-12);
+  return std::isfinite(result) ? result : -1.0;
+}
+
+/// Marks the `count` first in order, which is (rank, index): [index_end].
+template <class Rank>
+std::vector<uint8_t> first_of(std::vector<std::pair<Rank, size_t>>& order, size_t count, size_t index_end) {
+  std::ranges::nth_element(order, order.begin() + static_cast<std::ptrdiff_t>(count));
+  std::vector<uint8_t> marks(index_end, 0);
+  for (size_t i = 0; i < count; ++i) marks[order[i].second] = 1;
+  return marks;
+}
+
 size_t remove_by(const DensityRules& rules, splatting::GaussianModel& model) {
   const std::vector<Fate> fates = model.judge(rules);
   return model.remove_if([&](size_t index) { return fates[index] == Fate::goes; });
@@ -92,10 +115,16 @@ size_t make_room(const DensificationOptions& options, size_t newcomers, splattin
     if (s.visible >= kMinViews) order.emplace_back(s.weight / s.visible, index);
   });
   const size_t leaving = std::min(model.size() + newcomers - limit, order.size());
-  std::ranges::nth_element(order, order.begin() + static_cast<std::ptrdiff_t>(leaving));
-  std::vector<uint8_t> remove(model.index_end(), 0);
-  for (size_t i = 0; i < leaving; ++i) remove[order[i].second] = 1;
-  return model.remove(remove);
+  return model.remove(first_of(order, leaving, model.index_end()));
+}
+
+size_t keep_budget(const DensificationOptions& options, splatting::GaussianModel& model) {
+  const auto limit = static_cast<size_t>(options.max_gaussians);
+  if (model.size() <= limit) return 0;
+  std::vector<std::pair<double, size_t>> order;
+  order.reserve(model.size());
+  model.for_each([&](size_t index) { order.emplace_back(presence(model.get(index)), index); });
+  return model.remove(first_of(order, model.size() - limit, model.index_end()));
 }
 
 size_t prune(const DensificationOptions& options, double scene_depth, splatting::GaussianModel& model) {

@@ -40,6 +40,10 @@ size_t prune_idle(const DensificationOptions& options, splatting::GaussianModel&
 /// are idle to where they are missed.
 size_t make_room(const DensificationOptions& options, size_t newcomers, splatting::GaussianModel& model);
 
+/// Removes what exceeds max_gaussians: of all those go whose opacity, times the solid angle they cover as seen from
+/// their anchor, is least. Needs no statistics, so that gaussians with and without a past compare. Returns how many.
+size_t keep_budget(const DensificationOptions& options, splatting::GaussianModel& model);
+
 /// Removes gaussians that are nearly transparent, larger than max_scale * scene_depth, or not finite.
 size_t prune(const DensificationOptions& options, double scene_depth, splatting::GaussianModel& model);
 

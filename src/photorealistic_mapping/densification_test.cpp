@@ -114,5 +114,37 @@ TEST_F(DensificationTest, WhatWeighsLeastMakesRoom) {
   EXPECT_EQ(make_room(options, 100, model), 3u) << "no more than can be judged";
 }
 
+TEST_F(DensificationTest, WhatIsLeastPresentGoesBeyondTheBudget) {
+  const auto at = [](float distance, float scale, float opacity_logit) {
+    Gaussian g = gaussian(scale, opacity_logit);
+    g.mean[2] = distance;
+    return g;
+  };
+  Gaussian broken = at(1, 0.01f, 2);
+  broken.log_scale[1] = std::numeric_limits<float>::quiet_NaN();
+  Gaussian flat = at(1, 0.04f, 2);  // a disc is as large as a ball
+  flat.log_scale[0] = -20;
+  add(at(1, 0.02f, 2), 0);   // 0: 4 units of 1e-4
+  add(broken, 0);            // 1
+  add(at(4, 0.04f, 2), 0);   // 2: 1 unit
+  add(flat, 0);              // 3: 16 units
+  add(at(1, 0.02f, -8), 0);  // 4: next to nothing
+  add(at(10, 0.30f, 2), 0);  // 5: 9 units
+  for (size_t i = 0; i < 6; ++i) model.set_tag(i, static_cast<uint32_t>(i));
+  options.max_gaussians = 6;
+  EXPECT_EQ(keep_budget(options, model), 0u);
+  const auto left = [&](int budget) {
+    options.max_gaussians = budget;
+    keep_budget(options, model);
+    std::vector<uint32_t> tags;
+    model.for_each([&](size_t i) { tags.push_back(model.tag(i)); });
+    return tags;
+  };
+  EXPECT_EQ(left(5), (std::vector<uint32_t>{0, 2, 3, 4, 5}));
+  EXPECT_EQ(left(4), (std::vector<uint32_t>{0, 2, 3, 5}));
+  EXPECT_EQ(left(3), (std::vector<uint32_t>{0, 3, 5}));
+  EXPECT_EQ(left(1), (std::vector<uint32_t>{3}));
+}
+
 }  // namespace
 }  // namespace photoslam

@@ -99,10 +99,18 @@ int KeyframeSchedule::draw_worse() {
   return losses_[static_cast<size_t>(a)] >= losses_[static_cast<size_t>(b)] ? a : b;
 }
 
+/// While seams are revisited: what the camera sees now must not wait for them.
+bool KeyframeSchedule::newest_is_due() const {
+  const int wanted = options_.uses_per_level * (coarsest_level_ - online_level_ + 1);
+  return !newest_came_last_ && uses(active_.back()) < wanted;
+}
+
 KeyframeSchedule::Choice KeyframeSchedule::next(bool refining) {
   PHOTOSLAM_CHECK(!active_.empty());
   Choice choice;
-  if (is_revisiting()) {
+  if (is_revisiting() && !refining && newest_is_due()) {
+    choice.view = active_.back();
+  } else if (is_revisiting()) {
     choice.view = take(revisits_);
   } else if (!refining && random_.uniform() < options_.newest_probability) {
     choice.view = active_.back();
@@ -110,6 +118,7 @@ KeyframeSchedule::Choice KeyframeSchedule::next(bool refining) {
     const bool worse = options_.worse_probability > 0 && random_.uniform() < options_.worse_probability;
     choice.view = worse ? draw_worse() : draw();
   }
+  newest_came_last_ = choice.view == active_.back();
   int& uses = uses_[static_cast<size_t>(choice.view)];
   int finest = refining ? 0 : online_level_;
   if (options_.online_uses > 0) finest = std::max(0, finest - uses / options_.online_uses);

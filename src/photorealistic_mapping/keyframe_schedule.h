@@ -32,7 +32,8 @@ struct ScheduleOptions {
 /// the finest one allowed: the full image in refinement, less while frames arrive where that is too costly. What counts
 /// is how large the pictures are, so the levels follow from that. When online_uses have taught what a smaller picture
 /// can teach, the next finer level is allowed while frames arrive, too. Keyframes at which a correction of the map left
-/// a seam go before all others.
+/// a seam go before all others, but in turns with the newest one until that has been used uses_per_level times on each
+/// level there is while frames arrive.
 class KeyframeSchedule {
  public:
   struct Choice {
@@ -73,6 +74,7 @@ class KeyframeSchedule {
   int draw();
   int draw_worse();
   int take(std::vector<int>& views);
+  bool newest_is_due() const;
 
   ScheduleOptions options_;
   int coarsest_level_, online_level_;
@@ -82,6 +84,7 @@ class KeyframeSchedule {
   std::vector<int> active_;
   std::vector<int> round_;     // views still to come in this round
   std::vector<int> revisits_;  // views that go before them, each as often as it is to come
+  bool newest_came_last_ = false;
 };
 
 }  // namespace photoslam

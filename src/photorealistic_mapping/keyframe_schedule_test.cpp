@@ -84,12 +84,34 @@ TEST(KeyframeSchedule, TheNewestViewGetsItsShare) {
   EXPECT_NEAR(static_cast<double>(newest) / kDraws, expected, 0.015);  // 4.6 standard deviations
 }
 
-TEST(KeyframeSchedule, SeamsComeBeforeTheNewest) {
+TEST(KeyframeSchedule, TheNewestTakesTurnsWithSeamsUntilItIsTaught) {
   ScheduleOptions options;
   options.newest_probability = 1;
+  options.uses_per_level = 3;
+  options.seam_uses = 20;
+  KeyframeSchedule schedule(options, 640, 480, 5);
+  ASSERT_EQ(schedule.coarsest_level() - schedule.online_level(), 1);
+  for (int i = 0; i < 4; ++i) schedule.add_view();
+  schedule.revisit(std::vector{1, 2});
+  std::vector<bool> newest;
+  for (int i = 0; i < 20; ++i) newest.push_back(schedule.next(false).view == 3);
+  for (size_t i = 0; i < 20; ++i) EXPECT_EQ(newest[i], i < 12 && i % 2 == 0) << i;
+  schedule.add_view();
+  EXPECT_EQ(schedule.next(false).view, 4) << "the next one does not wait either";
+  EXPECT_NE(schedule.next(false).view, 4);
+  EXPECT_NE(schedule.next(true).view, 4) << "nothing arrives any more";
+  schedule.retire(4);
+  EXPECT_NE(schedule.next(false).view, 4);
+}
+
+TEST(KeyframeSchedule, SeamsComeBeforeANewestThatIsTaught) {
+  ScheduleOptions options;
+  options.newest_probability = 1;
+  options.uses_per_level = 1;
   options.seam_uses = 2;
   KeyframeSchedule schedule(options, 640, 480, 5);
   for (int i = 0; i < 4; ++i) schedule.add_view();
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(schedule.next(false).view, 3);
   schedule.revisit(std::vector{1});
   EXPECT_EQ(schedule.next(false).view, 1);
   EXPECT_EQ(schedule.next(false).view, 1);

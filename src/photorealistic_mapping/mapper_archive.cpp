@@ -36,7 +36,9 @@ void ExposureAdjustment::serialize(Archive& a) {
   a(steps_);
 }
 
-void KeyframeSchedule::serialize(Archive& a) { a(random_, uses_, losses_, active_, round_, revisits_); }
+void KeyframeSchedule::serialize(Archive& a) {
+  a(random_, uses_, losses_, active_, round_, revisits_, newest_came_last_);
+}
 
 void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
   ImageU8 color;
@@ -52,12 +54,13 @@ void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
     view = &views_.emplace_back();
     if (!color.empty()) set_images(color, depth, sensor_.mask, *view);
   }
-  a(view->adjustment, view->exposure);
+  a(view->adjustment, view->exposure, view->exposure_is_known);
   if (depth.empty()) serialize_image(a, view->picture.depth);  // otherwise it follows from the depth image
   serialize_image(a, view->right);
 }
 
 void PhotorealisticMapper::serialize(Archive& a) {
+  wholeness_.check(kName);
   uint64_t num_views = views_.size();
   a(random_, schedule_, model_, anchors_from_world_, anchor_scales_, scene_depth_, iteration_, training_psnr_,
     num_corrections_, num_views);

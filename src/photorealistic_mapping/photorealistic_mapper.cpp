@@ -102,6 +102,7 @@ PhotorealisticMapper::PhotorealisticMapper(const PhotorealisticOptions& options,
 }
 
 void PhotorealisticMapper::update_poses(const MapSnapshot& map) {
+  const auto change = begin_change();
   std::vector<double> depths;
   std::vector<Sim3> before, after;
   for (size_t i = 0; i < anchors_from_world_.size(); ++i) {
@@ -166,6 +167,7 @@ void PhotorealisticMapper::rescale(size_t index, double factor) {
 void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, const KeyframeImages& images,
                                         Executor& executor, const std::optional<splatting::Exposure>& exposure) {
   PHOTOSLAM_CHECK(static_cast<size_t>(id.value) == views_.size(), "keyframe {} after {}", id.value, views_.size());
+  const auto change = begin_change();
   const Keyframe& keyframe = map.keyframe(id).keyframe;
   anchors_from_world_.push_back(keyframe.camera_from_world);
   anchor_scales_.push_back(keyframe.scale);
@@ -323,20 +325,29 @@ void PhotorealisticMapper::seed(size_t index, int cell, double min_color_error, 
 
 void PhotorealisticMapper::add_gaussians(std::span<const splatting::Gaussian> in_world) {
   PHOTOSLAM_CHECK(has_keyframes(), "gaussians need a keyframe to be anchored to");
+  const auto change = begin_change();
   const SE3& anchor_from_world = anchors_from_world_.front();
   const ShRotation rotation(anchor_from_world.matrix3());
   std::vector<splatting::Gaussian> in_anchor;
   for (const splatting::Gaussian& g : in_world) in_anchor.push_back(transform(g, anchor_from_world, rotation));
   model_.add(0, in_anchor, 0, static_cast<uint32_t>(iteration_));
+  keep_gaussian_budget();
+}
+
+size_t PhotorealisticMapper::keep_gaussian_budget() {
+  const auto change = begin_change();
+  return keep_budget(options_.densification, model_);
 }
 
 void PhotorealisticMapper::append(PhotorealisticMapper other) {
+  const auto change = begin_change();
   anchors_from_world_.insert(anchors_from_world_.end(), other.anchors_from_world_.begin(),
                              other.anchors_from_world_.end());
   anchor_scales_.insert(anchor_scales_.end(), other.anchor_scales_.begin(), other.anchor_scales_.end());
   std::ranges::move(other.views_, std::back_inserter(views_));
   model_.append(other.model_);
   schedule_.append(other.schedule_);
+  keep_gaussian_budget();
   if (has_keyframes()) keep_image_budget();
 }
 
@@ -361,6 +372,7 @@ splatting::TrainOptions PhotorealisticMapper::train_options(std::optional<double
 }
 
 splatting::StepResult PhotorealisticMapper::train(std::optional<double> progress, Executor& executor) {
+  const auto change = begin_change();
   const KeyframeSchedule::Choice choice = schedule_.next(progress.has_value());
   const auto index = static_cast<size_t>(choice.view);
   TrainingView& view = views_[index];

@@ -8,6 +8,7 @@
 
 #include "base/executor.h"
 #include "base/options.h"
+#include "base/wholeness.h"
 #include "image/pyramid.h"
 #include "map/snapshot.h"
 #include "photorealistic_mapping/densification.h"
@@ -102,11 +103,15 @@ class PhotorealisticMapper {
   void add_keyframe(const MapSnapshot& map, KeyframeId id, const KeyframeImages& images, Executor& executor,
                     const std::optional<splatting::Exposure>& exposure = {});
 
-  /// Adds gaussians from elsewhere, given in the world frame, to the first keyframe; there must be one.
+  /// Adds gaussians from elsewhere, given in the world frame, to the first keyframe; there must be one. As in append(),
+  /// what is too much for the budget goes.
   void add_gaussians(std::span<const splatting::Gaussian> in_world);
 
   /// Adds all that another mapper has come to, its keyframes counted on from those of this one.
   void append(PhotorealisticMapper other);
+
+  /// Removes what exceeds max_gaussians, as after loading a map that was made with a larger budget. Returns how many.
+  size_t keep_gaussian_budget();
 
   /// One training iteration, Eq. (4). At least one keyframe is needed. `progress` in [0, 1] says how much of the
   /// refinement is done; empty while frames arrive.
@@ -126,8 +131,10 @@ class PhotorealisticMapper {
   FrozenMap freeze() const;
 
   /// Writes everything that training has come to, or continues from where it was written: with the same options the
-  /// next iterations are those that would have followed.
+  /// next iterations are those that would have followed. Throws when the map is not whole.
   void serialize(Archive& archive);
+  /// False once an exception has left a change half made: such a map is neither written nor changed any more.
+  bool is_whole() const { return wholeness_.is_whole(); }
 
  private:
   /// A keyframe as training material, while its pictures are within the budget.
@@ -143,6 +150,8 @@ class PhotorealisticMapper {
     void drop_images();
   };
 
+  static constexpr const char* kName = "the photorealistic map";
+  Wholeness::Change begin_change() { return {wholeness_, kName}; }
   SE3 view_from_world(size_t view) const;
   splatting::RenderOptions render_options() const;
   splatting::TrainOptions train_options(std::optional<double> progress) const;
@@ -163,6 +172,7 @@ class PhotorealisticMapper {
 
   PhotorealisticOptions options_;
   MapperSensor sensor_;
+  Wholeness wholeness_;
   Random random_;
   KeyframeSchedule schedule_;
   splatting::GaussianModel model_;

@@ -281,6 +281,81 @@ TEST_F(PhotorealisticMapperTest, ContinuesFromAnArchiveAsIfNothingHadHappened) {
   EXPECT_EQ(mapper.gaussians().size(), loaded.gaussians().size());
 }
 
+/// Keyframes, all but the first of a known exposure, and corrections, before and after an archive: nothing tells that
+/// there was one.
+TEST_F(PhotorealisticMapperTest, ContinuesFromAnArchiveThroughCorrectionsAsIfNothingHadHappened) {
+  const MapperSensor sensor{.camera = kCamera, .stereo_baseline_m = kBaseline};
+  PhotorealisticOptions options;
+  options.reseed_interval = 1;  // also in keyframes that no iteration has used yet
+  const splatting::Exposure known{{0.5f, 0.6f, 0.7f}, {0, 0, 0}};
+  PhotorealisticMapper mapper(options, sensor, 1);
+  add(mapper, at(0), stereo(at(0)));
+  for (int i = 0; i < 40; ++i) mapper.train({}, executor_);
+  const auto correct = [&](double x) {
+    const Sim3 stay, move(SE3(so3_exp(Vec3(0, 0.02, 0)), Vec3(x, 0, 0)));
+    MapCorrection correction;
+    correction.new_world_from_old_world.assign(static_cast<size_t>(count_), move);
+    correction.new_world_from_old_world[0] = stay;
+    world_.apply(correction);
+  };
+  for (const double x : {0.1, 0.2, 0.3, 0.6}) add(mapper, at(x), stereo(at(x)), 0.9, known);
+  correct(0.05);
+  mapper.update_poses(*world_.snapshot());
+  ASSERT_TRUE(mapper.has_seams());
+
+  Archive saved;
+  mapper.serialize(saved);
+  PhotorealisticMapper loaded(options, sensor, 99);
+  Archive reader(saved.bytes());
+  loaded.serialize(reader);
+  correct(-0.03);
+  world_.add(at(0.9));
+  KeyframeImages images = stereo(at(0.9));
+  images.color = to_rgb(world_.picture(at(0.9)));
+  std::vector<std::string> ends;
+  for (PhotorealisticMapper* m : {&mapper, &loaded}) {
+    for (int i = 0; i < 8; ++i) m->train({}, executor_);
+    m->update_poses(*world_.snapshot());
+    for (int i = 0; i < 8; ++i) m->train({}, executor_);
+    m->add_keyframe(*world_.snapshot(), KeyframeId(5), images, executor_);
+    for (int i = 0; i < 12; ++i) m->train({}, executor_);
+    for (int i = 0; i < 5; ++i) m->train(0.1 * i, executor_);
+    Archive end;
+    m->serialize(end);
+    ends.push_back(end.take_bytes());
+  }
+  EXPECT_TRUE(ends[0] == ends[1]);
+}
+
+TEST_F(PhotorealisticMapperTest, ThereAreNeverMoreGaussiansThanTheBudgetAllows) {
+  constexpr size_t kBudget = 700;
+  const MapperSensor sensor{.camera = kCamera, .stereo_baseline_m = kBaseline};
+  PhotorealisticOptions options;
+  options.densification.max_gaussians = kBudget;
+  PhotorealisticMapper mapper(options, sensor, 1), other(options, sensor, 2);
+  add(mapper, at(0), stereo(at(0)));
+  EXPECT_EQ(mapper.gaussians().size(), kBudget) << "as many cells would like to have one";
+  world_ = testing::WallWithKeyframes(kCamera);
+  count_ = 0;
+  add(other, at(0.3), stereo(at(0.3)));
+  mapper.append(std::move(other));
+  EXPECT_EQ(mapper.gaussians().size(), kBudget);
+  for (const int anchor : {0, 1}) EXPECT_GT(mapper.gaussians().size(anchor), kBudget / 4) << "both give way";
+  const std::vector<splatting::Gaussian> more(50, mapper.gaussians().get(0));
+  mapper.add_gaussians(more);
+  EXPECT_EQ(mapper.gaussians().size(), kBudget);
+
+  Archive saved;
+  mapper.serialize(saved);
+  options.densification.max_gaussians = 400;
+  PhotorealisticMapper smaller(options, sensor, 1);
+  Archive reader(saved.bytes());
+  smaller.serialize(reader);
+  EXPECT_EQ(smaller.keep_gaussian_budget(), kBudget - 400);
+  EXPECT_EQ(smaller.gaussians().size(), 400u);
+  EXPECT_EQ(smaller.keep_gaussian_budget(), 0u);
+}
+
 TEST_F(PhotorealisticMapperTest, ForgetsPicturesBeyondTheBudgetAndGoesOn) {
   const MapperSensor sensor{.camera = kCamera, .stereo_baseline_m = kBaseline};
   PhotorealisticOptions options;

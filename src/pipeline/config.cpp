@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -188,6 +189,35 @@ class TableReader {
   std::vector<std::pair<const Leaf*, ConfigValue>> assignments_;
 };
 
+/// A value of a file whose key is unknown.
+std::string as_written(const toml::node& node) {
+  if (const auto v = node.value_exact<bool>()) return to_toml(*v);
+  if (const auto v = node.value_exact<int64_t>()) return fmt::format("{}", *v);
+  if (const auto v = node.value_exact<double>()) return to_toml(*v);
+  if (const auto v = node.value_exact<std::string>()) return to_toml(*v);
+  return "…";
+}
+
+void compare(const toml::table& table, const std::string& prefix, const std::vector<Group>& groups,
+             std::vector<std::string>& found, std::vector<ConfigDifference>& differences) {
+  for (const auto& [name, node] : table) {
+    const std::string key = prefix.empty() ? std::string(name.str()) : fmt::format("{}.{}", prefix, name.str());
+    if (const toml::table* inner = node.as_table()) {
+      compare(*inner, key, groups, found, differences);
+      continue;
+    }
+    found.push_back(key);
+    const Leaf* leaf = find_leaf(groups, key);
+    if (leaf == nullptr) {
+      differences.push_back({key, as_written(node), ""});
+      continue;
+    }
+    const Result<ConfigValue> value = read_node("", *leaf, node);
+    if (value && *value == current_value(*leaf)) continue;
+    differences.push_back({key, value ? to_toml(*value) : as_written(node), to_toml(current_value(*leaf))});
+  }
+}
+
 template <class Number>
 std::optional<Number> parse_whole(std::string_view text) {
   Number value{};
@@ -275,6 +305,25 @@ std::vector<ConfigEntry> changed_values(const OptionsRef& options, const Options
   size_t index = 0;
   std::erase_if(changed, [&](const ConfigEntry& entry) { return entry.value == original[index++].value; });
   return changed;
+}
+
+Result<std::vector<ConfigDifference>> config_differences(std::string_view toml, std::string_view name,
+                                                         const OptionsRef& options) {
+  const std::vector<Group> groups = collect(options);
+  std::vector<ConfigDifference> differences;
+  std::vector<std::string> found;
+  try {
+    compare(toml::parse(toml, name), "", groups, found, differences);
+  } catch (const toml::parse_error& failure) {
+    return error("{}{}", position(name, failure.source()), failure.description());
+  }
+  for (const Group& group : groups) {
+    for (const Leaf& leaf : group.leaves) {
+      if (std::ranges::find(found, leaf.key) != found.end()) continue;
+      differences.push_back({leaf.key, "", to_toml(current_value(leaf))});
+    }
+  }
+  return differences;
 }
 
 std::string to_toml(const ConfigValue& value) {

@@ -55,6 +55,17 @@ std::vector<ConfigEntry> config_values(const OptionsRef& options);
 /// The values that differ from those of `defaults`, which must be of the same type.
 std::vector<ConfigEntry> changed_values(const OptionsRef& options, const OptionsRef& defaults);
 
+/// A value that a configuration file has otherwise than the options.
+struct ConfigDifference {
+  std::string key;
+  std::string in_file, in_options;  ///< As TOML writes them; empty where there is no such value.
+};
+
+/// What the TOML text says otherwise than the options, which it leaves alone; keys of other versions differ, too. An
+/// error where the text is no TOML.
+Result<std::vector<ConfigDifference>> config_differences(std::string_view toml, std::string_view name,
+                                                         const OptionsRef& options);
+
 /// The value as TOML writes it.
 std::string to_toml(const ConfigValue& value);
 

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <map>
 
 namespace photoslam {
 namespace {
@@ -164,6 +165,51 @@ TEST(ConfigManual, HasOneRowPerValue) {
   Options options;
   EXPECT_THAT(config_manual(options),
               HasSubstr("| `huber_px` | `2.5` | px | 0.5 … 10 | Residual above which the loss is linear. |\n"));
+}
+
+TEST(ConfigDifferences, NamesWhatDiffersOnBothSides) {
+  Options then;
+  then.kernel.huber_px = 3;
+  then.name = "old";
+  const std::string toml = config_as_toml(then) + "bent = 1\n[solver.retired]\nstep = 0.5\n";
+  Options now;
+  now.count = 9;
+  const auto differences = config_differences(toml, "f", now);
+  ASSERT_TRUE(differences);
+  std::map<std::string, std::pair<std::string, std::string>> found;
+  for (const ConfigDifference& d : *differences) found[d.key] = {d.in_file, d.in_options};
+  EXPECT_EQ(found, (std::map<std::string, std::pair<std::string, std::string>>{
+                       {"name", {"\"old\"", "\"map\""}},
+                       {"solver.count", {"8", "9"}},
+                       {"solver.kernel.huber_px", {"3.0", "2.5"}},
+                       {"solver.kernel.bent", {"1", ""}},
+                       {"solver.retired.step", {"0.5", ""}},
+                   }));
+  EXPECT_EQ(now.name, "map") << "nothing is set";
+}
+
+TEST(ConfigDifferences, ThereAreNoneToWhatWasWrittenFromThem) {
+  Options options;
+  options.rate = 1;
+  EXPECT_TRUE(config_differences(config_as_toml(options), "f", options)->empty());
+  EXPECT_TRUE(config_differences("name = 'map'\nseed = 0\n[solver]\nrate = 1\ncount = 8\n[solver.kernel]\n"
+                                 "robust = true\nhuber_px = 2.5\n",
+                                 "f", options)
+                  ->empty())
+      << "1 is 1.0";
+}
+
+TEST(ConfigDifferences, WhatTheFileLacksOrCannotMeanDiffers) {
+  Options options;
+  const auto differences = config_differences("seed = 'x'\n[solver]\nrate = 7.0\n", "f", options);
+  ASSERT_TRUE(differences);
+  std::map<std::string, std::string> found;
+  for (const ConfigDifference& d : *differences) found[d.key] = d.in_file;
+  EXPECT_EQ(found["seed"], "\"x\"");
+  EXPECT_EQ(found["solver.rate"], "7.0");
+  EXPECT_EQ(found.at("solver.kernel.robust"), "");
+  EXPECT_EQ(found.size(), 6u);
+  EXPECT_FALSE(config_differences("seed = = 1", "f", options));
 }
 
 }  // namespace

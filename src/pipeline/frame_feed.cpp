@@ -3,7 +3,9 @@
 #include "pipeline/frame_feed.h"
 
 #include <algorithm>
+#include <iterator>
 
+#include "base/check.h"
 #include "base/clock.h"
 
 namespace photoslam {
@@ -35,13 +37,30 @@ std::optional<FedFrame> FrameFeed::next() {
   if (stop_.stop_requested()) return std::nullopt;
   std::optional<Frame> frame = source_.next();
   if (!frame) return std::nullopt;
+  note_time(*frame);
   const auto now = steady_clock::now();
   return FedFrame{std::move(*frame), now, now};
 }
 
 int64_t FrameFeed::timestamp_ns(FrameId frame) const {
   std::lock_guard lock(mutex_);
-  return timestamps_.at(frame);
+  const auto after = timestamps_.lower_bound(frame);
+  PHOTOSLAM_CHECK(after != timestamps_.end(), "frame {}", frame.value);
+  if (after->first == frame || after == timestamps_.begin()) return after->second;
+  const auto before = std::prev(after);
+  const double share = static_cast<double>(frame.value - before->first.value) /
+                       static_cast<double>(after->first.value - before->first.value);
+  return before->second + static_cast<int64_t>(share * static_cast<double>(after->second - before->second));
+}
+
+bool FrameFeed::was_read(FrameId frame) const {
+  std::lock_guard lock(mutex_);
+  return timestamps_.contains(frame);
+}
+
+void FrameFeed::note_time(const Frame& frame) {
+  std::lock_guard lock(mutex_);
+  timestamps_[frame.id] = frame.timestamp_ns;
 }
 
 void FrameFeed::wait_until(SteadyTime due) {
@@ -65,9 +84,9 @@ void FrameFeed::read_all() {
           pace_ == Pace::realtime ? early_.push({std::move(*frame), now}) : release(std::move(*frame), now);
       if (!taken) break;
     }
-  } catch (const std::exception& e) {
+  } catch (...) {
     std::lock_guard lock(mutex_);
-    failure_ = e.what();
+    failure_ = exception_text();
   }
   early_.close();
   if (pace_ != Pace::realtime) finish();
@@ -99,10 +118,7 @@ void FrameFeed::finish() {
 }
 
 bool FrameFeed::release(Frame frame, SteadyTime due) {
-  {
-    std::lock_guard lock(mutex_);
-    timestamps_[frame.id] = frame.timestamp_ns;
-  }
+  note_time(frame);
   return queue_.push({std::move(frame), due, steady_clock::now()});
 }
 

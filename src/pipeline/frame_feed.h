@@ -41,8 +41,10 @@ class FrameFeed {
   /// The next frame; nothing at the end of the input or after a stop.
   std::optional<FedFrame> next();
 
-  /// Of a frame that was read, also if it was dropped.
+  /// Of any frame up to the one that next() gave last. Those that the source left out lie between their neighbours.
   int64_t timestamp_ns(FrameId frame) const;
+  /// Whether the source has delivered it.
+  bool was_read(FrameId frame) const;
 
  private:
   struct ReadFrame {
@@ -53,6 +55,7 @@ class FrameFeed {
   void read_all();
   void release_all();
   bool release(Frame frame, SteadyTime due);
+  void note_time(const Frame& frame);
   void finish();
   void wait_until(SteadyTime due);
 

@@ -130,5 +130,48 @@ TEST_F(FrameFeedTest, AFailingSourceStopsTheRunAndIsNamed) {
   EXPECT_TRUE(stop_.stop_requested());
 }
 
+/// Every third frame only.
+class WithGaps final : public FrameSource {
+ public:
+  const SourceInfo& info() const override { return info_; }
+  std::optional<Frame> next() override {
+    if (next_ > 9) return std::nullopt;
+    Frame frame;
+    frame.id = FrameId(next_);
+    frame.timestamp_ns = 100 + 10 * next_;
+    next_ += 3;
+    return frame;
+  }
+
+ private:
+  int next_ = 0;
+  SourceInfo info_;
+};
+
+TEST_F(FrameFeedTest, FramesThatTheSourceLeftOutLieBetweenTheirNeighbours) {
+  for (const bool threaded : {false, true}) {
+    WithGaps source;
+    FrameFeed feed(source, Pace::asap, 3, threaded, stop_.get_token(), failures_);
+    EXPECT_EQ(take_all(feed), (std::vector<int>{0, 3, 6, 9}));
+    for (int i = 0; i <= 9; ++i) {
+      EXPECT_EQ(feed.timestamp_ns(FrameId(i)), 100 + 10 * i) << i;
+      EXPECT_EQ(feed.was_read(FrameId(i)), i % 3 == 0) << i;
+    }
+  }
+}
+
+class ThrowsANumber final : public EmptyFrames {
+ public:
+  ThrowsANumber() : EmptyFrames(3, 1) {}
+  std::optional<Frame> next() override { throw 42; }
+};
+
+TEST_F(FrameFeedTest, WhateverASourceThrowsIsReported) {
+  ThrowsANumber source;
+  FrameFeed feed(source, Pace::asap, 3, true, stop_.get_token(), failures_);
+  EXPECT_TRUE(take_all(feed).empty());
+  EXPECT_TRUE(failures_.text().starts_with("input: ")) << failures_.text();
+}
+
 }  // namespace
 }  // namespace photoslam

@@ -13,10 +13,6 @@ DepthSensor depth_sensor(const SourceInfo& info, double baseline_m) {
           .baseline_m = baseline_m};
 }
 
-double scale_of(const MapSnapshot* map, KeyframeId keyframe) {
-  return map != nullptr && map->has(keyframe) ? map->keyframe(keyframe).keyframe.scale : 1.0;
-}
-
 double milliseconds(SteadyTime from, SteadyTime to) {
   return std::chrono::duration<double, std::milli>(to - from).count();
 }
@@ -77,13 +73,12 @@ FrameOutcome LocalizationWorker::process(FedFrame fed, const std::shared_ptr<con
   outcome.online_camera_from_world = result.camera_from_world;
   outcome.reference = result.reference;
   outcome.camera_from_reference = result.camera_from_reference;
-  outcome.reference_scale = scale_of(map.get(), result.reference);
+  outcome.reference_scale = result.reference_scale;
   const bool is_initial_view = tracker_.initial_view() == frame.id;
   if (!result.keyframe && !is_initial_view) return outcome;
   auto images = std::make_shared<KeyframeImages>(KeyframeImages{to_rgb(color), std::move(depth), std::move(right)});
   if (result.keyframe) {
     outcome.keyframe = result.keyframe->id;
-    result.keyframe->reference_scale = scale_of(map.get(), result.keyframe->reference);
     keyframe = NewKeyframe{std::move(*result.keyframe), images, std::move(initial_images_)};
   }
   initial_images_ = is_initial_view ? std::move(images) : nullptr;

@@ -7,6 +7,12 @@
 
 namespace photoslam {
 
+bool replaces(const MappingMessage& newer, const MappingMessage& last) {
+  const bool only_poses =
+      last.update.map && !last.update.keyframe.valid() && !last.update.session && last.iterations == 0;
+  return only_poses && newer.update.map;
+}
+
 MappingWorker::MappingWorker(const SystemOptions& options, const RunSettings& settings, MapperSensor sensor,
                              Executor& executor, Autosave& autosave)
     : mapper_(options.photorealistic_mapping, std::move(sensor), settings.seed, settings.gpu),

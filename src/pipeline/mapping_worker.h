@@ -29,6 +29,9 @@ struct MappingMessage {
   int iterations = 0;  ///< By logical time: so many, now.
 };
 
+/// Whether a message is needless once a newer one waits right behind it: it brings nothing but poses, and so does that.
+bool replaces(const MappingMessage& newer, const MappingMessage& last);
+
 /// Runs photorealistic mapping behind a message queue, freezes the map that counts as the online result, and keeps the
 /// figures that others may read at any time.
 class MappingWorker {

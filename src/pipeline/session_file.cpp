@@ -14,11 +14,12 @@
 #include "base/check.h"
 #include "base/checked_file.h"
 #include "photorealistic_mapping/image_archive.h"
+#include "pipeline/config.h"
 
 namespace photoslam {
 namespace {
 
-constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 7, .oldest = 7};
+constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 8, .oldest = 8};
 
 /// Lets deflate or inflate work through the input; their counts have 32 bits.
 template <class Step>
@@ -68,6 +69,13 @@ std::optional<std::string> unpacked(std::string_view bytes) {
   return whole ? std::optional(std::move(result)) : std::nullopt;
 }
 
+/// Where a value that applies from now on does not reach what the map holds already.
+std::string_view what_stays(std::string_view key) {
+  if (key.starts_with("features.")) return "; landmarks of the session keep the features they were made with";
+  if (key == "photorealistic_mapping.sh_degree") return "; the gaussians of the session keep their degree";
+  return "";
+}
+
 }  // namespace
 
 void SessionHeader::serialize(Archive& a) {
@@ -97,6 +105,22 @@ SessionHeader session_header(const std::string& session) {
   Archive reader(session);
   reader(header);
   return header;
+}
+
+std::vector<std::string> describe_changed_options(const SessionHeader& session, SystemOptions options) {
+  const auto differences = config_differences(session.configuration, "session", options);
+  if (!differences) return {"the configuration of the session cannot be compared: " + differences.error().message};
+  std::vector<std::string> lines;
+  for (const ConfigDifference& d : *differences) {
+    if (d.in_options.empty()) {
+      lines.push_back(
+          fmt::format("{} = {} in the session: this version has no such value, it is ignored", d.key, d.in_file));
+    } else {
+      const std::string was = d.in_file.empty() ? "the session says nothing of it" : "the session had " + d.in_file;
+      lines.push_back(fmt::format("{} = {} applies, {}{}", d.key, d.in_options, was, what_stays(d.key)));
+    }
+  }
+  return lines;
 }
 
 Status check_session_sensor(const SessionHeader& session, const PinholeCamera& camera, double bf) {

@@ -4,10 +4,12 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "base/archive.h"
 #include "base/result.h"
 #include "photorealistic_mapping/photorealistic_mapper.h"
+#include "pipeline/system_options.h"
 
 namespace photoslam {
 
@@ -32,5 +34,9 @@ SessionHeader session_header(const std::string& session);
 /// Whether frames fit to a session, by their camera and by what a depth is worth (bf as in the header): the error says
 /// what differs.
 Status check_session_sensor(const SessionHeader& session, const PinholeCamera& camera, double bf);
+
+/// What whoever continues a session with other options should know, one line per value that differs: what it is now,
+/// what it was, and what the loaded map keeps of it.
+std::vector<std::string> describe_changed_options(const SessionHeader& session, SystemOptions options);
 
 }  // namespace photoslam

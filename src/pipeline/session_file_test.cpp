@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/session_file.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 #include <unistd.h>
 
 #include <cstring>
@@ -15,7 +15,13 @@
 namespace photoslam {
 namespace {
 
+using ::testing::AllOf;
 using testing::CornerSource;
+using ::testing::ElementsAre;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using ::testing::UnorderedElementsAre;
 
 /// A walk of 60 frames, saved as a session.
 class SessionTest : public ::testing::Test {
@@ -111,6 +117,79 @@ TEST_F(SessionTest, GoesOnMappingWhereTheOtherEnded) {
   const SE3 error = *pose * CornerSource::camera_from_world(109).inverse();
   EXPECT_LT(error.translation.norm(), 0.05);
   EXPECT_GT(read_session(folder / "longer")->size(), bytes->size());
+}
+
+/// Its pictures have a row too many from some frame on: tracking does not mind, photorealistic mapping throws.
+class TallFrames final : public FrameSource {
+ public:
+  TallFrames(int num_frames, int first_tall) : first_tall_(first_tall), frames_(num_frames) {}
+  const SourceInfo& info() const override { return frames_.info(); }
+  std::optional<Frame> next() override {
+    std::optional<Frame> frame = frames_.next();
+    if (!frame || frame->id.value < first_tall_) return frame;
+    ImageU8 tall(frame->color.width(), frame->color.height() + 1, 3);
+    std::ranges::copy(frame->color.values(), tall.values().begin());
+    frame->color = std::move(tall);
+    return frame;
+  }
+
+ private:
+  int first_tall_;
+  CornerSource frames_;
+};
+
+TEST_F(SessionTest, OneThatAFailureLeftHalfDoneDoesNotReplaceTheOneBefore) {
+  for (const int threads : {1, 2}) {
+    const std::filesystem::path file = folder / "before";
+    std::filesystem::copy_file(folder / "session.photoslam", file, std::filesystem::copy_options::overwrite_existing);
+    RunSettings failing = settings("before");
+    failing.threads = threads;
+    TallFrames source(60, 3);
+    const RunOutcome outcome = run_slam({}, failing, source);
+    EXPECT_TRUE(outcome.failure.starts_with("photorealistic mapping: ")) << outcome.failure;
+    EXPECT_TRUE(*read_session(file) == *bytes);
+    ASSERT_EQ(outcome.messages.size(), 1u);
+    EXPECT_THAT(outcome.messages[0], AllOf(StartsWith("session: " + file.string()), HasSubstr("is left as it is")));
+    EXPECT_GT(outcome.final.gaussians.size(), 0u) << "the map itself is not lost";
+  }
+}
+
+TEST_F(SessionTest, ASmallerBudgetOfGaussiansHoldsForTheLoadedMap) {
+  const auto budget = static_cast<int>(first->final.gaussians.size() / 2);
+  SystemOptions options;
+  options.pipeline.iterations_per_frame = 1;
+  options.photorealistic_mapping.densification.max_gaussians = budget;
+  for (const int num_frames : {0, 20}) {
+    CornerSource source(num_frames);
+    source.start_at = 50;
+    const RunOutcome outcome = run_slam(options, continuing("smaller"), source);
+    EXPECT_EQ(outcome.failure, "");
+    EXPECT_GT(outcome.final.gaussians.size(), 0u);
+    EXPECT_LE(outcome.final.gaussians.size(), static_cast<size_t>(budget)) << num_frames << " frames";
+    ASSERT_EQ(outcome.messages.size(), 1u);
+    EXPECT_NE(outcome.messages[0].find("max_gaussians"), std::string::npos);
+  }
+  RunSettings localize = continuing("");
+  localize.localize_only = true;
+  CornerSource source(12);
+  EXPECT_EQ(run_slam(options, localize, source).final.gaussians.size(), first->final.gaussians.size())
+      << "it is left as it is";
+}
+
+TEST_F(SessionTest, TellsWhichOptionsDifferFromThoseItWasMadeWith) {
+  SystemOptions options;
+  options.pipeline.iterations_per_frame = 1;
+  SessionHeader header = session_header(*bytes);
+  EXPECT_TRUE(describe_changed_options(header, options).empty());
+  options.localization.min_inliers = 33;
+  options.features.num_levels = 5;
+  header.configuration += "[retired]\nstep = 0.5\n";
+  EXPECT_THAT(describe_changed_options(header, options),
+              UnorderedElementsAre(AllOf(StartsWith("localization.min_inliers = 33 applies"), EndsWith("had 20")),
+                                   AllOf(StartsWith("features.num_levels = 5 applies"), HasSubstr("had 8; landmarks")),
+                                   AllOf(StartsWith("retired.step = 0.5 in the session"), EndsWith("ignored"))));
+  header.configuration = "no [ TOML";
+  EXPECT_THAT(describe_changed_options(header, options), ElementsAre(HasSubstr("cannot be compared")));
 }
 
 TEST_F(SessionTest, IsThereBeforeTrainingBegins) {

@@ -8,6 +8,7 @@
 #include "map/connected_components.h"
 #include "map/map_spacing.h"
 #include "pipeline/session_file.h"
+#include "pipeline/session_maps.h"
 
 namespace photoslam {
 namespace {
@@ -47,6 +48,10 @@ bool are_joined(std::span<const int> component_of_keyframe, size_t num_keyframes
 Result<MergedSessions> merge_sessions(const SystemOptions& options, const std::string& first, const std::string& second,
                                       Executor& executor) {
   LoadedSession one(options, first), two(options, second);
+  for (const auto& [session, which] : {std::pair{&one, "first"}, {&two, "second"}}) {
+    const Status maps = check_session_maps(session->geometry, session->mapper);
+    if (!maps) return error("the {} session cannot be continued: {}", which, maps.error().message);
+  }
   if (Status fits = check_session_sensor(one.header, two.header.sensor.camera, two.header.bf); !fits) {
     return fits.error();
   }

@@ -162,6 +162,21 @@ TEST_F(SessionMergeTest, AMapBegunLaterLiesBesideAllParts) {
   }
 }
 
+TEST_F(SessionMergeTest, MapsOfDifferentKeyframesAreRefused) {
+  const std::string good = session(0, 20);
+  LoadedParts few(good), many(session(0, 60));
+  ASSERT_NE(few.mapper.num_keyframes(), many.mapper.num_keyframes());
+  Archive torn;
+  torn(many.header, many.geometry, few.mapper);
+  const auto message = [&](const std::string& first, const std::string& second) {
+    const auto merged = merge_sessions({}, first, second, executor);
+    return merged ? std::string() : merged.error().message;
+  };
+  EXPECT_NE(message(torn.bytes(), good).find("first session"), std::string::npos);
+  EXPECT_NE(message(good, torn.bytes()).find("second session cannot be continued: there are gaussians for"),
+            std::string::npos);
+}
+
 TEST_F(SessionMergeTest, SessionsOfOtherSensorsAreRefused) {
   focal = CornerSource::kWide;
   const auto merged = merge_sessions({}, session(0, 20), session(0, 40, SensorKind::mono), executor);

@@ -14,6 +14,17 @@
 
 namespace photoslam {
 
+/// What the exception that is being handled says.
+inline std::string exception_text() {
+  try {
+    throw;
+  } catch (const std::exception& e) {
+    return e.what();
+  } catch (...) {
+    return "something was thrown that is no std::exception and does not say what has failed";
+  }
+}
+
 /// The first component that threw, and what it said. Reporting a failure asks the whole pipeline to stop.
 class FailureReport {
  public:
@@ -46,19 +57,27 @@ class Stage {
     std::function<void(Message)> handle;
     std::function<bool()> idle = {};      ///< Called while nothing waits; false: nothing to do until a message comes.
     std::function<void()> on_start = {};  ///< Runs first on the stage's thread.
+    /// With this, posters never wait: the queue grows, but what waits last is forgotten when a newer message replaces
+    /// it.
+    std::function<bool(const Message& newer, const Message& last)> replaces = {};
   };
 
   Stage(size_t capacity, bool threaded, Work work, FailureReport& failures)
-      : queue_(capacity, Overflow::block), work_(std::move(work)), failures_(failures), threaded_(threaded) {
+      : queue_(capacity, work.replaces ? Overflow::grow : Overflow::block),
+        work_(std::move(work)),
+        failures_(failures),
+        threaded_(threaded) {
     if (threaded_) thread_ = std::thread([this] { loop(); });
   }
   ~Stage() { finish(); }
   Stage(const Stage&) = delete;
   Stage& operator=(const Stage&) = delete;
 
-  /// Waits while the queue is full.
+  /// Waits while the queue is full, unless Work::replaces says otherwise.
   void post(Message message) {
-    if (threaded_) {
+    if (threaded_ && work_.replaces) {
+      queue_.push(std::move(message), work_.replaces);
+    } else if (threaded_) {
       queue_.push(std::move(message));
     } else {
       guarded([&] { work_.handle(std::move(message)); });
@@ -76,7 +95,7 @@ class Stage {
 
  private:
   void loop() {
-    if (work_.on_start) work_.on_start();
+    if (work_.on_start) guarded(work_.on_start);
     while (true) {
       std::optional<Message> message = queue_.try_pop();
       if (!message) {
@@ -96,9 +115,9 @@ class Stage {
     if (failed_) return;
     try {
       function();
-    } catch (const std::exception& e) {
+    } catch (...) {
       failed_ = true;
-      failures_.report(work_.name, e.what());
+      failures_.report(work_.name, exception_text());
     }
   }
 

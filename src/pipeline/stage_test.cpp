@@ -46,8 +46,47 @@ TEST_P(StageTest, AThrowingComponentIsNamedAndStopsThePipelineWithoutBlockingIt)
   EXPECT_EQ(failures.text(), "geometry mapping: broken map");
 }
 
+TEST_P(StageTest, WhateverIsThrownIsReported) {
+  Stage<int> stage(2, GetParam(), {.name = "mapping", .handle = [](int i) { throw i; }}, failures);
+  stage.post(1);
+  stage.post(2);
+  stage.finish();
+  EXPECT_TRUE(stop.stop_requested());
+  EXPECT_TRUE(failures.text().starts_with("mapping: ")) << failures.text();
+  EXPECT_NE(failures.text().find("no std::exception"), std::string::npos) << failures.text();
+}
+
 INSTANTIATE_TEST_SUITE_P(Threading, StageTest, ::testing::Bool(),
                          [](const auto& suite) { return suite.param ? "OwnThread" : "Inline"; });
+
+TEST(Stage, ThatForgetsWhatIsReplacedKeepsNobodyWaiting) {
+  std::stop_source stop;
+  FailureReport failures{stop};
+  std::atomic<bool> may_go_on = false;
+  std::vector<int> seen;
+  Stage<int> stage(2, true,
+                   {.name = "slow",
+                    .handle =
+                        [&](int i) {
+                          while (!may_go_on) std::this_thread::yield();
+                          seen.push_back(i);
+                        },
+                    .replaces = [](int newer, int last) { return last < 0 && newer != 50; }},
+                   failures);
+  stage.post(0);
+  while (stage.backlog() > 0) std::this_thread::yield();  // it is being handled
+  for (int i = 1; i < 100; ++i) {
+    stage.post(-i);  // replaced by the next one
+    stage.post(i);
+  }
+  may_go_on = true;
+  stage.finish();
+  std::vector<int> expected;
+  for (int i = 0; i < 50; ++i) expected.push_back(i);
+  expected.push_back(-50);
+  for (int i = 50; i < 100; ++i) expected.push_back(i);
+  EXPECT_EQ(seen, expected);
+}
 
 TEST(Stage, WorksWhileIdleAndSleepsWhenThereIsNothingToDo) {
   std::stop_source stop;

@@ -18,6 +18,7 @@
 #include "pipeline/localization_worker.h"
 #include "pipeline/mapping_worker.h"
 #include "pipeline/session_file.h"
+#include "pipeline/session_maps.h"
 #include "pipeline/stage.h"
 #include "splatting/gpu.h"
 
@@ -88,6 +89,7 @@ class Session {
   void look_for_loops();
   void close_remaining_loops();
   std::shared_ptr<const MapSnapshot> load_session();
+  void drop_gaussians_beyond_budget();
   std::shared_ptr<Archive> begin_session();
   void save_session();
   void save_if_due();
@@ -108,6 +110,7 @@ class Session {
   std::stop_callback<std::function<void()>> forward_stop_;
   FailureReport failures_;
   Stopwatch clock_;
+  RunOutcome outcome_;
 
   ThreadPool executor_;
   LocalizationWorker localization_;
@@ -137,8 +140,6 @@ class Session {
   std::vector<Vec3> shown_positions_;
   size_t num_shown_ = 0;
 
-  RunOutcome outcome_;
-
   Stage<MappingMessage> mapping_stage_;
   Stage<GeometryMessage> geometry_stage_;
   Stage<LoopMessage> loop_stage_;
@@ -153,14 +154,23 @@ std::shared_ptr<const MapSnapshot> Session::load_session() {
   const Status fits = check_session_sensor(header, localization_.camera(), localization_.bf());
   PHOTOSLAM_CHECK(fits.ok(), "{}", fits.error().message);
   reader(geometry_, mapping_.mapper());
-  PHOTOSLAM_CHECK(geometry_.map().num_keyframes() == mapping_.mapper().num_keyframes(),
-                  "the session has gaussians for {} of {} keyframes: begin a new one",
-                  mapping_.mapper().num_keyframes(), geometry_.map().num_keyframes());
+  const Status whole = check_session_maps(geometry_, mapping_.mapper());
+  PHOTOSLAM_CHECK(whole.ok(), "the session cannot be continued: {}; begin a new one", whole.error().message);
+  if (!settings_.localize_only) drop_gaussians_beyond_budget();
   auto map = geometry_.snapshot();
   loop_closer_.resume(*map);
   localization_.resume(static_cast<int>(map->keyframes.size()), next_free_place(*map));
   mapping_.gaussians = mapping_.mapper().gaussians().size();
   return map;
+}
+
+/// The loaded map may have been made with a larger budget.
+void Session::drop_gaussians_beyond_budget() {
+  const size_t dropped = mapping_.mapper().keep_gaussian_budget();
+  if (dropped == 0) return;
+  outcome_.messages.push_back(
+      fmt::format("{} gaussians of the loaded map are gone: photorealistic_mapping.densification.max_gaussians is {}",
+                  dropped, options_.photorealistic_mapping.densification.max_gaussians));
 }
 
 /// Header and geometric map; the photorealistic map follows.
@@ -171,22 +181,22 @@ std::shared_ptr<Archive> Session::begin_session() {
   return session;
 }
 
-/// After all stages have ended. A session whose two maps do not fit could not be continued; an older one can.
+/// After all stages have ended. A session whose maps are no pair could not be continued; an older one can.
 void Session::save_session() {
   if (settings_.session_file.empty() || settings_.localize_only || !mapping_.mapper().has_keyframes()) return;
-  const size_t placed = geometry_.map().num_keyframes(), drawn = mapping_.mapper().num_keyframes();
-  if (placed != drawn) {
-    failures_.report("session", fmt::format("{} is left as it is: gaussians for {} of {} keyframes only",
-                                            settings_.session_file.string(), drawn, placed));
-    return;
-  }
+  std::string problem;
   try {
-    if (const Status status = mapping_.save(*begin_session()); !status) {
-      failures_.report("session", status.error().message);
+    if (const Status maps = check_session_maps(geometry_, mapping_.mapper()); !maps) {
+      problem = fmt::format("{} is left as it is: {}", settings_.session_file.string(), maps.error().message);
+    } else if (const Status saved = mapping_.save(*begin_session()); !saved) {
+      problem = saved.error().message;
     }
-  } catch (const std::exception& e) {
-    failures_.report("session", e.what());
+  } catch (...) {
+    problem = fmt::format("{} is left as it is: {}", settings_.session_file.string(), exception_text());
   }
+  if (problem.empty()) return;
+  if (!failures_.text().empty()) outcome_.messages.push_back("session: " + problem);  // the cause is told already
+  failures_.report("session", problem);
 }
 
 /// While frames arrive: asks for it, and waits for nothing.
@@ -282,6 +292,9 @@ Stage<MappingMessage>::Work Session::mapping_work() {
   work.handle = [this](const MappingMessage& message) { mapping_.handle(message); };
   if (!logical_time_ && !settings_.localize_only) work.idle = [this] { return mapping_.train_while_idle(); };
   work.on_start = in_background;
+  // At real-time pace nothing that is tracked or placed waits for gaussians. A keyframe that waits for them keeps its
+  // pictures in memory, so that where time plays no role the queue is bounded.
+  if (!logical_time_ && settings_.pace == Pace::realtime) work.replaces = replaces;
   return work;
 }
 
@@ -325,13 +338,13 @@ void Session::receive_due_updates() {
 
 void Session::localize(FedFrame fed) {
   receive_due_updates();
-  // Frames the queue has dropped never came here.
+  // Frames that the device or the queue has dropped never came here.
   for (; next_frame_id_ < fed.frame.id.value; ++next_frame_id_) {
     FrameOutcome dropped;
     dropped.frame = FrameId(next_frame_id_);
     dropped.timestamp_ns = feed_.timestamp_ns(dropped.frame);
     dropped.dropped = true;
-    dropped.reason = "came too fast";
+    dropped.reason = feed_.was_read(dropped.frame) ? "came too fast" : "dropped by the camera";
     record(std::move(dropped));
   }
   next_frame_id_ = fed.frame.id.value + 1;
@@ -357,15 +370,15 @@ void Session::localize_all(const std::function<void()>& after_each_frame) {
       localize(std::move(*fed));
       after_each_frame();
     }
-  } catch (const std::exception& e) {
-    failures_.report("localization", e.what());
+  } catch (...) {
+    failures_.report("localization", exception_text());
   }
   geometry_stage_.finish();
   loop_stage_.finish();
   try {
     close_remaining_loops();
-  } catch (const std::exception& e) {
-    failures_.report("loop closure", e.what());
+  } catch (...) {
+    failures_.report("loop closure", exception_text());
   }
   frame_number_ = std::numeric_limits<int>::max();
   receive_due_updates();
@@ -410,8 +423,8 @@ void Session::tell(const std::function<void(const Progress&)>& on_progress, cons
   if (!on_progress) return;
   try {
     on_progress(progress);
-  } catch (const std::exception& e) {
-    failures_.report("progress report", e.what());
+  } catch (...) {
+    failures_.report("progress report", exception_text());
   }
 }
 
@@ -428,8 +441,8 @@ void Session::refine(const std::function<void(const Progress&)>& on_progress) {
     try {
       mapping_.refine(done);
       if (autosave_.begin()) autosave_.ended(mapping_.save(*begin_session()));
-    } catch (const std::exception& e) {
-      failures_.report("photorealistic mapping", e.what());
+    } catch (...) {
+      failures_.report("photorealistic mapping", exception_text());
       break;
     }
     if (elapsed - last_report < 1e-3 * static_cast<double>(kProgressInterval.count())) continue;
@@ -491,7 +504,7 @@ RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress)
   if (settings_.gpu) outcome_.gpu = GpuUse{settings_.gpu->peak_mb(), settings_.gpu->busy_seconds() - busy_before};
   outcome_.interrupted = outer_stop_.stop_requested();
   outcome_.failure = failures_.text();
-  outcome_.messages = autosave_.take_failures();
+  for (std::string& message : autosave_.take_failures()) outcome_.messages.push_back(std::move(message));
   return std::move(outcome_);
 }
 

@@ -164,6 +164,27 @@ TEST(RunSlam, AnUnreadableFrameIsCountedAndSkipped) {
   EXPECT_TRUE(outcome.frames[7].has_pose) << outcome.frames[7].reason;
 }
 
+TEST(RunSlam, FramesThatTheCameraHasDroppedAreCounted) {
+  for (const int threads : {1, 2}) {
+    CornerSource source(12);
+    source.gap_at = 6;
+    source.gap = 3;
+    const RunOutcome outcome = run(std::move(source), deterministic(threads));
+    EXPECT_EQ(outcome.failure, "");
+    ASSERT_EQ(outcome.frames.size(), 15u);
+    for (int i = 0; i < 15; ++i) {
+      const FrameOutcome& frame = outcome.frames[static_cast<size_t>(i)];
+      EXPECT_EQ(frame.frame, FrameId(i));
+      EXPECT_EQ(frame.dropped, i >= 6 && i < 9) << i;
+      EXPECT_EQ(frame.has_pose, !frame.dropped) << i;
+      if (i > 0) {
+        EXPECT_GT(frame.timestamp_ns, outcome.frames[static_cast<size_t>(i - 1)].timestamp_ns) << i;
+      }
+    }
+    EXPECT_EQ(outcome.frames[7].reason, "dropped by the camera");
+  }
+}
+
 TEST(RunSlam, AFailingSourceEndsTheRunWithEverythingMadeSoFar) {
   for (int threads : {1, 2}) {
     CornerSource source(30);
@@ -197,6 +218,12 @@ TEST(RunSlam, AListenerThatThrowsEndsTheRunWithEverythingMadeSoFar) {
     EXPECT_GE(outcome.frames.size(), 10u);
     EXPECT_GT(outcome.final.gaussians.size(), 0u);
   }
+}
+
+TEST(RunSlam, AListenerMayThrowAnything) {
+  CornerSource source(20);
+  const RunOutcome outcome = run_slam({}, deterministic(2), source, {}, [](const Progress&) { throw 42; });
+  EXPECT_TRUE(outcome.failure.starts_with("progress report: ")) << outcome.failure;
 }
 
 TEST(RunSlam, ThePreviewShowsThePathSoFar) {

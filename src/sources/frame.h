@@ -21,7 +21,7 @@ enum class SensorKind { mono, stereo, rgbd };
 
 /// One input frame as delivered by a source.
 struct Frame {
-  FrameId id;
+  FrameId id;  ///< Counts up; those that a source leaves out stand for frames that its device has dropped.
   int64_t timestamp_ns = 0;
   ImageU8 color;   ///< RGB, or grey with one channel.
   ImageU16 depth;  ///< RGB-D only, registered to the colour image; metres = value * SourceInfo::metres_per_depth_unit.

@@ -34,6 +34,7 @@ class IdealMapper {
     map_.set_parent(id, parent);
     map_.cull_keyframe(id);
   }
+  void apply(const MapCorrection& correction) { map_.apply(correction); }
   std::shared_ptr<const MapSnapshot> snapshot() { return map_.snapshot(); }
 
  private:

@@ -50,6 +50,7 @@ class CornerSource final : public FrameSource {
       frame.defect = "unreadable";
     }
     ++next_;
+    if (next_ > gap_at && gap_at >= 0) frame.id.value += gap;
     return frame;
   }
 
@@ -62,7 +63,9 @@ class CornerSource final : public FrameSource {
 
   int throw_at = -1;   ///< next() throws instead of delivering this frame.
   int defect_at = -1;  ///< This frame cannot be read.
-  int start_at = 0;    ///< The walk begins where it would be after so many frames.
+  int gap_at = -1;     ///< Before this frame, so many have been dropped.
+  int gap = 0;
+  int start_at = 0;  ///< The walk begins where it would be after so many frames.
 
  private:
   static constexpr int kTexture = 64;

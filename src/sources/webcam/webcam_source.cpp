@@ -34,23 +34,18 @@ class WebcamSource final : public FrameSource {
     if (!pending_) pending_ = queue_.pop();
     if (!pending_) return std::nullopt;
     Frame frame;
-    frame.id = FrameId(next_id_++);
     if (!*pending_) {  // the end, and why
+      frame.id = FrameId(next_id_++);
       frame.timestamp_ns = last_ns_ + 1;
       frame.defect = pending_->error().message;
       pending_.reset();
       return frame;
     }
     GrabbedFrame& grabbed = **pending_;
-    const uint32_t missing = last_sequence_ ? grabbed.sequence - *last_sequence_ - 1 : 0;
-    last_sequence_ = grabbed.sequence;
-    if (missing > 0 && missing < 1u << 30) {  // said once; the frame itself comes with the next call
-      frame.timestamp_ns = last_ns_ + std::max<int64_t>(1, (grabbed.timestamp_ns - last_ns_) / 2);
-      frame.defect = fmt::format("{} frames of the camera were dropped", missing);
-      last_ns_ = frame.timestamp_ns;
-      return frame;
-    }
-    frame.timestamp_ns = std::max(grabbed.timestamp_ns, last_ns_ + 1);
+    const int32_t missing = num_missing(grabbed.sequence);
+    frame.id = FrameId(next_id_ + missing);
+    next_id_ = frame.id.value + 1;
+    frame.timestamp_ns = std::max(grabbed.timestamp_ns, last_ns_ + missing + 1);  // every missing one has its time
     last_ns_ = frame.timestamp_ns;
     if (!grabbed.image) {
       frame.defect = grabbed.image.error().message;
@@ -65,6 +60,14 @@ class WebcamSource final : public FrameSource {
 
  private:
   static constexpr size_t kWaiting = 4;
+
+  /// Frames between the last one and this.
+  int32_t num_missing(uint32_t sequence) {
+    constexpr uint32_t kMost = 100'000;  // nearly an hour: a larger step means that the driver counts anew
+    const uint32_t missing = last_sequence_ ? sequence - *last_sequence_ - 1 : 0;
+    last_sequence_ = sequence;
+    return missing <= kMost ? static_cast<int32_t>(missing) : 0;
+  }
 
   void read(const std::stop_token& stop) {
     while (!stop.stop_requested()) {

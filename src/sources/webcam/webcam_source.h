@@ -11,8 +11,8 @@ namespace photoslam::internal {
 std::optional<std::string> camera_device(const std::string& name);
 
 /// A camera as a mono source without end: read on a thread of its own, the oldest of four waiting frames dropped when
-/// nobody takes them. Frames that were dropped, there or by the driver, show as one frame with a defect that counts
-/// them. The stream ends with a defect when the camera is unplugged.
+/// nobody takes them. The ids of frames that were dropped, there or by the driver, are left out. The stream ends with a
+/// defect when the camera is unplugged.
 Result<std::unique_ptr<FrameSource>> open_webcam(const std::string& device, const SourceOptions& options,
                                                  std::unique_ptr<DeviceCalls> calls = system_device_calls());
 
