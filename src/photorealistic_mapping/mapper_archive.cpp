@@ -54,7 +54,7 @@ void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
     view = &views_.emplace_back();
     if (!color.empty()) set_images(color, depth, sensor_.mask, *view);
   }
-  a(view->adjustment, view->exposure, view->exposure_is_known);
+  a(view->adjustment, view->exposure, view->exposure_is_known, view->lacks_depth);
   if (depth.empty()) serialize_image(a, view->picture.depth);  // otherwise it follows from the depth image
   serialize_image(a, view->right);
 }
