@@ -13,6 +13,7 @@
 namespace photoslam {
 namespace {
 
+using internal::find_best_plane;
 using internal::follow_path;
 using internal::kCostScale;
 using internal::kPlaneLanes;
@@ -125,18 +126,13 @@ void aggregate(Sweep& sweep, const Direction& direction, int16_t small_penalty, 
 /// The best plane of each pixel, between planes by a parabola; negative where the match is poor or ambiguous.
 ImageF choose_planes(const DepthSweepOptions& options, const Sweep& sweep, int num_directions) {
   const auto max_cost = static_cast<int16_t>(options.max_cost * kCostScale * kSignatureBits);
-  const auto margin = static_cast<int>(options.min_margin * kCostScale * kSignatureBits * num_directions);
+  const auto margin = static_cast<int16_t>(options.min_margin * kCostScale * kSignatureBits * num_directions);
   ImageF plane(sweep.width, sweep.height, 1, -1.0f);
   for (int y = kSignatureRadius; y < sweep.height - kSignatureRadius; ++y) {
     for (int x = kSignatureRadius; x < sweep.width - kSignatureRadius; ++x) {
       const int16_t* const total = sweep.total.data() + sweep.at(x, y);
-      const auto best = static_cast<int>(std::min_element(total, total + sweep.planes) - total);
-      if (sweep.cost[sweep.at(x, y) + static_cast<size_t>(best)] > max_cost) continue;
-      bool ambiguous = false;
-      for (int k = 0; k < sweep.planes && !ambiguous; ++k) {
-        ambiguous = std::abs(k - best) > 2 && total[k] < total[best] + margin;
-      }
-      if (ambiguous) continue;
+      const auto [best, ambiguous] = find_best_plane(sweep.planes, total, margin);
+      if (ambiguous || sweep.cost[sweep.at(x, y) + static_cast<size_t>(best)] > max_cost) continue;
       plane(x, y) = static_cast<float>(best);
       if (best == 0 || best == sweep.planes - 1) continue;
       const float before = total[best - 1], here = total[best], after = total[best + 1];

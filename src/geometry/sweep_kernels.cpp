@@ -78,6 +78,25 @@ int16_t follow_path(int planes, const int16_t* cost, const int16_t* previous, in
   return *std::min_element(lanes, lanes + hn::Lanes(d));
 }
 
+BestPlane find_best_plane(int planes, const int16_t* total, int16_t margin) {
+  const hn::CappedTag<int16_t, kPlaneLanes> d;
+  const auto lanes = static_cast<int>(hn::Lanes(d));
+  auto minimum = hn::LoadU(d, total);
+  for (int k = lanes; k < planes; k += lanes) minimum = hn::Min(minimum, hn::LoadU(d, total + k));
+  int16_t least[kPlaneLanes];
+  hn::StoreU(minimum, d, least);
+  BestPlane best;
+  const int16_t value = *std::min_element(least, least + lanes);
+  while (total[best.plane] != value) ++best.plane;
+  const auto limit = hn::SaturatedAdd(hn::Set(d, value), hn::Set(d, margin));
+  const auto two = hn::Set(d, int16_t{2});
+  for (int k = 0; k < planes && !best.ambiguous; k += lanes) {
+    const auto away = hn::Abs(hn::Iota(d, k - best.plane));
+    best.ambiguous = !hn::AllFalse(d, hn::And(hn::Gt(away, two), hn::Lt(hn::LoadU(d, total + k), limit)));
+  }
+  return best;
+}
+
 }  // namespace photoslam::internal::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -86,6 +105,7 @@ namespace photoslam::internal {
 
 HWY_EXPORT(match_row);
 HWY_EXPORT(follow_path);
+HWY_EXPORT(find_best_plane);
 
 void match_row(const uint32_t* reference, int count, std::span<const float> inverse_depths,
                std::span<const SweepRow> views, int16_t* cost) {
@@ -95,6 +115,10 @@ void match_row(const uint32_t* reference, int count, std::span<const float> inve
 int16_t follow_path(int planes, const int16_t* cost, const int16_t* previous, int16_t least, int16_t small_penalty,
                     int16_t large_penalty, int16_t* path, int16_t* total) {
   return HWY_DYNAMIC_DISPATCH(follow_path)(planes, cost, previous, least, small_penalty, large_penalty, path, total);
+}
+
+BestPlane find_best_plane(int planes, const int16_t* total, int16_t margin) {
+  return HWY_DYNAMIC_DISPATCH(find_best_plane)(planes, total, margin);
 }
 
 }  // namespace photoslam::internal

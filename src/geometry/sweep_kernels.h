@@ -33,4 +33,12 @@ void match_row(const uint32_t* reference, int count, std::span<const float> inve
 int16_t follow_path(int planes, const int16_t* cost, const int16_t* previous, int16_t least, int16_t small_penalty,
                     int16_t large_penalty, int16_t* path, int16_t* total);
 
+/// The first plane of least total. It is ambiguous when another, more than two planes away, costs less than `margin`
+/// more.
+struct BestPlane {
+  int plane = 0;
+  bool ambiguous = false;
+};
+BestPlane find_best_plane(int planes, const int16_t* total, int16_t margin);
+
 }  // namespace photoslam::internal

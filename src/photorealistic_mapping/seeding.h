@@ -21,7 +21,7 @@ struct SeedingOptions {
   double sigma_cells = 0.7;
   double thickness = 0.2;
   double max_stretch = 2.9;
-  double opacity = 0.3;
+  double opacity = 0.5;
   double min_transmittance = 0.5;
   double min_color_error = 0.10;
   double feature_sigma_px = 2.0;
