@@ -11,7 +11,7 @@ namespace photoslam {
 struct DensificationOptions {
   bool enabled = true;
   int interval = 200;
-  double gradient_threshold = 4e-4;
+  double gradient_threshold = 7e-4;
   double split_size = 0.01;
   double min_opacity = 0.03;
   double max_scale = 0.25;
