@@ -36,7 +36,7 @@ void ExposureAdjustment::start_from(const splatting::Exposure& exposure) {
 }
 
 void ExposureAdjustment::match(const DepthPicture& picture, const splatting::RenderResult& render) {
-  constexpr float kOpaque = 0.8f;
+  constexpr float kOpaque = 0.9f;  // fresh seeds let more through, and look dark
   constexpr double kMinShare = 0.2, kMaxLogGain = 1.4;
   constexpr double kTrustedError = 0.1;  // where gain * render is off by this share, the ratio counts by half
   const size_t plane = render.alpha.size(), channels = static_cast<size_t>(picture.color.channels());
