@@ -288,7 +288,7 @@ struct ShortRun {
   bool failed;  // the GPU
   size_t gaussians;
 
-  explicit ShortRun(HostFaults* faults) {
+  explicit ShortRun(HostFaults* faults, bool trains = true) {
     Story story({48, 36, 42, 42, 24, 18});
     SerialExecutor executor;
     PhotorealisticOptions options = test_options();
@@ -303,11 +303,13 @@ struct ShortRun {
       story.next_keyframe(at(x));
       const auto id = KeyframeId(static_cast<int32_t>(mapper.num_keyframes()));
       mapper.add_keyframe(*story.map(), id, story.look(at(x), 1.0), executor);
-      mapper.train({}, executor);
+      if (trains) mapper.train({}, executor);
     }
     story.correct({Sim3(), Sim3::exp((Vec7() << 0.1, 0, 0.2, 0, 0.02, 0, 0.05).finished())});
     mapper.update_poses(*story.map());
-    for (const double progress : {0.1, 0.3}) mapper.train(progress, executor);
+    for (const double progress : {0.1, 0.3}) {
+      if (trains) mapper.train(progress, executor);
+    }
     Archive saved;
     mapper.serialize(saved);
     Archive reader(saved.bytes());
@@ -372,14 +374,16 @@ TEST(MapperOnGpu, GoesOnWithoutItWhereverMemoryRunsOut) {
 }
 
 TEST(MapperOnGpu, GoesOnWithoutItWheneverItIsLost) {
-  const ShortRun want(nullptr);
+  const ShortRun want(nullptr), untrained(nullptr, false);
   Branches branches;
   HostFaults faults;
   faults.lost = [&] { return branches.take(); };
   const ShortRun got(&faults);
   EXPECT_EQ(got.failed, branches.is_child());
   EXPECT_EQ(got.iterations, want.iterations);
-  EXPECT_GT(got.psnr, want.psnr - 2) << "what was not fetched is lost, no more";
+  // What was not fetched is lost: of the training, all in the worst case. Splitting opens gaps that it would have
+  // closed.
+  EXPECT_GT(got.psnr, untrained.psnr - 1);
   branches.end();
   EXPECT_GT(branches.count(), 300);
 }
