@@ -137,7 +137,7 @@ Vec3 surface_normal(const CellGrid& grid, const PinholeCamera& camera, int colum
   };
   const Vec3 towards_camera = -center.normalized();
   Vec3 normal = difference(1, 0).cross(difference(0, 1));
-  if (!cell.measured || normal.norm() < 1e-12) return towards_camera;
+  if (!cell.measured || normal.norm() < 1e-12) return Vec3(towards_camera);
   normal.normalize();
   return normal.dot(towards_camera) < 0 ? Vec3(-normal) : normal;
 }
