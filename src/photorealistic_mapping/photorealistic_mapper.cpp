@@ -35,6 +35,13 @@ DepthPicture make_picture(const CameraView& full, double metres_per_depth_unit) 
 /// Side of the cells that are seeded, in pixels of the picture that seeds are made of.
 int cell_size(const SeedingOptions& options) { return std::max(1, options.cell_px / kSeedingFactor); }
 
+/// Keeps `count` of them, evenly spread.
+void thin(std::vector<splatting::Gaussian>& seeds, size_t count) {
+  if (seeds.size() <= count) return;
+  for (size_t i = 0; i < count; ++i) seeds[i] = seeds[i * seeds.size() / count];
+  seeds.resize(count);
+}
+
 /// A GPU has no reason to spare pixels.
 ScheduleOptions schedule_options(ScheduleOptions options, bool on_gpu) {
   if (on_gpu) options.online_pixels = std::numeric_limits<int>::max();
@@ -311,8 +318,10 @@ void PhotorealisticMapper::seed(size_t index, int cell, double min_color_error, 
   const auto at_features = seed_features(options_.seeding, picture, kSeedingFactor, render_, features);
   seeds.insert(seeds.end(), at_features.begin(), at_features.end());
   const auto limit = static_cast<size_t>(options_.densification.max_gaussians);
-  if (options_.densification.relocation) make_room(options_.densification, seeds.size(), model_);
-  seeds.resize(std::min(seeds.size(), limit - std::min(limit, model_.size())));
+  // A picture may want more seeds than the budget has; they must not push out all that was learnt.
+  const size_t newcomers = std::min(seeds.size(), limit / 10);
+  if (options_.densification.relocation) make_room(options_.densification, newcomers, model_);
+  thin(seeds, limit - std::min(limit, model_.size()));
   // Seeds are made in the frame of the adjusted view; the anchor is the geometric keyframe.
   const SE3 anchor_from_view = view.adjustment.correction().inverse();
   const ShRotation rotation(anchor_from_view.matrix3());

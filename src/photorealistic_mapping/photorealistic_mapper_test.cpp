@@ -89,6 +89,25 @@ TEST_F(PhotorealisticMapperTest, DepthIsMeasuredOnlyForWhatTheMapDoesNotExplain)
   EXPECT_GT(measured, features_only + 100);
 }
 
+TEST_F(PhotorealisticMapperTest, ASmallBudgetIsSpreadOverThePictureAndKeptByWhatWasLearnt) {
+  PhotorealisticOptions options;
+  options.densification.max_gaussians = 300;
+  options.densification.relocation = true;
+  PhotorealisticMapper mapper(options, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
+  add(mapper, at(0), stereo(at(0)));
+  ASSERT_EQ(mapper.gaussians().size(), 300u);
+  int below = 0;
+  mapper.gaussians().for_each([&](size_t i) { below += mapper.gaussians().get(i).mean[1] > 0; });
+  EXPECT_NEAR(below, 158, 30) << "126 of 240 rows";
+  for (int i = 0; i < 20; ++i) mapper.train({}, executor_);
+  add(mapper, at(5), stereo(at(5)));  // all of it is new
+  int first = 0;
+  mapper.gaussians().for_each([&](size_t i) { first += mapper.gaussians().anchor(i) == 0; });
+  EXPECT_GE(first, 230) << "a tenth makes room";
+  EXPECT_LT(first, 300);
+  EXPECT_LE(mapper.gaussians().size(), 300u);
+}
+
 TEST_F(PhotorealisticMapperTest, TrainingImprovesTheRender) {
   PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
   for (const double x : {0.0, 0.3, 0.6}) add(mapper, at(x), stereo(at(x)));
