@@ -46,7 +46,7 @@ Undistorter::Undistorter(const PinholeCamera& lens, const Distortion& distortion
   }
 }
 
-/// Bilinear samples of an image whose number of channels is known while compiling, which is twice as fast.
+/// The number of channels is known while compiling because this is on the way of every frame.
 template <int kChannels>
 void Undistorter::sample(const ImageU8& distorted, ImageU8& result) const {
   const uint8_t* const mask = mask_.values().data();

@@ -166,6 +166,7 @@ class PhotorealisticMapper {
   void seed_keyframe(const MapSnapshot& map, size_t view, Executor& executor);
   void sweep_picture(const MapSnapshot& map, size_t view, Executor& executor);
   void show(size_t view, Executor& executor);
+  /// What show() has drawn of the same view is what need not be seeded. `cell` in pixels of the small picture.
   void seed(size_t view, int cell, double min_color_error, std::span<const DepthPixel> features);
   void render_picture(size_t view, Executor& executor);
   void maintain(std::optional<double> progress, Executor& executor);
