@@ -288,13 +288,15 @@ struct ShortRun {
   bool failed;  // the GPU
   size_t gaussians;
 
-  explicit ShortRun(HostFaults* faults, bool trains = true) {
+  /// Gaussians larger than `split_size` of the scene depth are split, others cloned.
+  ShortRun(HostFaults* faults, double split_size, bool trains = true) {
     Story story({48, 36, 42, 42, 24, 18});
     SerialExecutor executor;
     PhotorealisticOptions options = test_options();
     options.reseed_interval = 2;
     options.densification.interval = 3;
     options.densification.gradient_threshold = 5e-5;
+    options.densification.split_size = split_size;
     options.depth_weight = 0.01;
     options.schedule.start_pixels = 24 * 18;
     std::shared_ptr<splatting::Gpu> gpu = make_gpu(faults);
@@ -356,7 +358,8 @@ class Branches {
 };
 
 TEST(MapperOnGpu, GoesOnWithoutItWhereverMemoryRunsOut) {
-  const ShortRun want(nullptr);
+  constexpr double kSplitAll = 1e-5;
+  const ShortRun want(nullptr, kSplitAll);
   EXPECT_FALSE(want.failed);
   for (const bool for_good : {false, true}) {
     Branches branches;
@@ -365,7 +368,7 @@ TEST(MapperOnGpu, GoesOnWithoutItWhereverMemoryRunsOut) {
       if (std::exchange(is_first, false)) return false;  // when it is opened
       return branches.take() || (for_good && branches.is_child());
     };
-    const ShortRun got(&faults);
+    const ShortRun got(&faults, kSplitAll);
     EXPECT_EQ(got.iterations, want.iterations);
     EXPECT_NEAR(got.psnr, want.psnr, 0.5);
     branches.end();
@@ -374,15 +377,16 @@ TEST(MapperOnGpu, GoesOnWithoutItWhereverMemoryRunsOut) {
 }
 
 TEST(MapperOnGpu, GoesOnWithoutItWheneverItIsLost) {
-  const ShortRun want(nullptr), untrained(nullptr, false);
+  // Splitting opens gaps that lost training would have closed; cloning does not.
+  constexpr double kCloneAll = 10;
+  const ShortRun want(nullptr, kCloneAll), untrained(nullptr, kCloneAll, false);
   Branches branches;
   HostFaults faults;
   faults.lost = [&] { return branches.take(); };
-  const ShortRun got(&faults);
+  const ShortRun got(&faults, kCloneAll);
   EXPECT_EQ(got.failed, branches.is_child());
   EXPECT_EQ(got.iterations, want.iterations);
-  // What was not fetched is lost: of the training, all in the worst case. Splitting opens gaps that it would have
-  // closed.
+  // What was not fetched is lost: of the training, all in the worst case.
   EXPECT_GT(got.psnr, untrained.psnr - 1);
   branches.end();
   EXPECT_GT(branches.count(), 300);

@@ -250,7 +250,7 @@ void PhotorealisticMapper::seed_keyframe(const MapSnapshot& map, size_t view, Ex
   }
   const Keyframe& keyframe = map.keyframe(KeyframeId(static_cast<int32_t>(view))).keyframe;
   newest_features_ = feature_depths(options_.feature_depth, map, keyframe, picture, kSeedingFactor);
-  seed(view, cell_size(options_.seeding), options_.seeding.min_color_error, newest_features_);
+  seed(view, {cell_size(options_.seeding), options_.seeding.min_color_error}, newest_features_);
 }
 
 void PhotorealisticMapper::sweep_picture(const MapSnapshot& map, size_t index, Executor& executor) {
@@ -287,9 +287,10 @@ SE3 PhotorealisticMapper::view_from_world(size_t view) const {
   return views_[view].adjustment.correction() * anchors_from_world_[view];
 }
 
-splatting::RenderOptions PhotorealisticMapper::render_options() const {
+splatting::RenderOptions PhotorealisticMapper::render_options(int factor) const {
   splatting::RenderOptions render;
   render.near = static_cast<float>(options_.near_m);
+  render.shrink_factor = factor;
   return render;
 }
 
@@ -297,7 +298,7 @@ splatting::RenderOptions PhotorealisticMapper::render_options() const {
 void PhotorealisticMapper::render_picture(size_t index, Executor& executor) {
   camera_from_anchors(view_from_world(index), anchors_from_world_, camera_from_anchor_);
   const splatting::Camera camera = to_splatting(views_[index].picture.camera);
-  renderer_.render(model_, {camera, camera_from_anchor_}, render_options(), executor, render_);
+  renderer_.render(model_, {camera, camera_from_anchor_}, render_options(kSeedingFactor), executor, render_);
 }
 
 /// The map as the view's small picture shows it, as bright as the picture.
@@ -310,11 +311,11 @@ void PhotorealisticMapper::show(size_t index, Executor& executor) {
   apply(view.exposure.exposure(), render_);
 }
 
-void PhotorealisticMapper::seed(size_t index, int cell, double min_color_error, std::span<const DepthPixel> features) {
+void PhotorealisticMapper::seed(size_t index, const SeedingRound& round, std::span<const DepthPixel> features) {
   TrainingView& view = views_[index];
   const DepthPicture& picture = view.picture;
   const splatting::Exposure exposure = view.exposure.exposure();
-  auto seeds = seed_cells(options_.seeding, picture, render_, cell, min_color_error);
+  auto seeds = seed_cells(options_.seeding, picture, render_, round);
   const auto at_features = seed_features(options_.seeding, picture, kSeedingFactor, render_, features);
   seeds.insert(seeds.end(), at_features.begin(), at_features.end());
   const auto limit = static_cast<size_t>(options_.densification.max_gaussians);
@@ -360,10 +361,10 @@ void PhotorealisticMapper::append(PhotorealisticMapper other) {
   if (has_keyframes()) keep_image_budget();
 }
 
-splatting::TrainOptions PhotorealisticMapper::train_options(std::optional<double> progress) const {
+splatting::TrainOptions PhotorealisticMapper::train_options(std::optional<double> progress, int factor) const {
   const double decay = progress ? std::pow(options_.rates.final_factor, *progress) : 1.0;
   splatting::TrainOptions train;
-  train.render = render_options();
+  train.render = render_options(factor);
   if (options_.sh_interval > 0)
     train.render.sh_degree = std::min(iteration_ / options_.sh_interval, options_.sh_degree);
   const auto rate = [&](double value) { return static_cast<float>(decay * value); };
@@ -385,11 +386,10 @@ splatting::StepResult PhotorealisticMapper::train(std::optional<double> progress
   const KeyframeSchedule::Choice choice = schedule_.next(progress.has_value());
   const auto index = static_cast<size_t>(choice.view);
   TrainingView& view = views_[index];
-  splatting::TrainOptions options = train_options(progress);
+  splatting::TrainOptions options = train_options(progress, 1 << choice.level);
   options.exposure = view.exposure.exposure();
-  options.target_factor = 1 << choice.level;
   camera_from_anchors(view_from_world(index), anchors_from_world_, camera_from_anchor_);
-  const splatting::Camera camera = to_splatting(shrink(sensor_.camera, options.target_factor));
+  const splatting::Camera camera = to_splatting(shrink(sensor_.camera, options.render.shrink_factor));
   const splatting::StepResult result =
       trainer_.step(model_, {camera, camera_from_anchor_}, view.target, options, executor);
 
@@ -415,7 +415,9 @@ void PhotorealisticMapper::maintain(std::optional<double> progress, Executor& ex
     const auto active = schedule_.active();
     const auto view = active[static_cast<size_t>(random_.index(static_cast<int>(active.size())))];
     show(static_cast<size_t>(view), executor);
-    seed(static_cast<size_t>(view), std::max(1, cell_size(options_.seeding) / 2), options_.reseed_color_error, {});
+    const int cell = cell_size(options_.seeding);
+    const bool measured = !views_[static_cast<size_t>(view)].picture.depth.empty();  // what holes borrow is coarse
+    seed(static_cast<size_t>(view), {measured ? std::max(1, cell / 2) : cell, options_.reseed_color_error, true}, {});
   }
   if (iteration_ % options_.densification.interval != 0) return;
   if (progress && growing && options_.densification.enabled) {

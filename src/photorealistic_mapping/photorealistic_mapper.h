@@ -153,8 +153,8 @@ class PhotorealisticMapper {
   static constexpr const char* kName = "the photorealistic map";
   Wholeness::Change begin_change() { return {wholeness_, kName}; }
   SE3 view_from_world(size_t view) const;
-  splatting::RenderOptions render_options() const;
-  splatting::TrainOptions train_options(std::optional<double> progress) const;
+  splatting::RenderOptions render_options(int factor) const;
+  splatting::TrainOptions train_options(std::optional<double> progress, int factor) const;
   void set_images(const ImageU8& color, const ImageU16& depth, const ImageU8& mask, TrainingView& view) const;
   double megabytes(const TrainingView& view) const;
   void retire(size_t view);
@@ -166,8 +166,8 @@ class PhotorealisticMapper {
   void seed_keyframe(const MapSnapshot& map, size_t view, Executor& executor);
   void sweep_picture(const MapSnapshot& map, size_t view, Executor& executor);
   void show(size_t view, Executor& executor);
-  /// What show() has drawn of the same view is what need not be seeded. `cell` in pixels of the small picture.
-  void seed(size_t view, int cell, double min_color_error, std::span<const DepthPixel> features);
+  /// What show() has drawn of the same view is what need not be seeded.
+  void seed(size_t view, const SeedingRound& round, std::span<const DepthPixel> features);
   void render_picture(size_t view, Executor& executor);
   void maintain(std::optional<double> progress, Executor& executor);
 

@@ -22,9 +22,10 @@ struct Cell {
   double color_error = 0;              // squared difference of the means, summed over channels
   double transmittance = 1;
   bool has_data = false;
-  double depth = 0;       // measured [m]; 0 = none
-  bool measured = false;  // depth is the cell's own
-  int distance = 0;       // to the cell whose depth it is [cells]
+  double depth = 0;        // measured [m]; 0 = none
+  bool measured = false;   // depth is the cell's own
+  int distance = 0;        // to the cell whose depth it is [cells]
+  double drawn_depth = 0;  // by the map [m]
   Vec2 center() const { return {0.5 * (x0 + x1 - 1), 0.5 * (y0 + y1 - 1)}; }
 };
 
@@ -61,7 +62,7 @@ Cell summarize_cell(const DepthPicture& view, const splatting::RenderResult& ren
   cell.y1 = std::min(cell.y0 + size, view.camera.height);
   const size_t plane = static_cast<size_t>(view.camera.width) * static_cast<size_t>(view.camera.height);
   Vec3 rendered = Vec3::Zero();
-  double alpha = 0;
+  double alpha = 0, depth = 0;
   int pixels = 0;
   for (int y = cell.y0; y < cell.y1; ++y) {
     for (int x = cell.x0; x < cell.x1; ++x) {
@@ -72,6 +73,7 @@ Cell summarize_cell(const DepthPicture& view, const splatting::RenderResult& ren
       rendered += Vec3(static_cast<double>(render.rgb[i]), static_cast<double>(render.rgb[plane + i]),
                        static_cast<double>(render.rgb[2 * plane + i]));
       alpha += static_cast<double>(render.alpha[i]);
+      depth += static_cast<double>(render.depth[i]);
     }
   }
   cell.has_data = 4 * pixels >= (cell.x1 - cell.x0) * (cell.y1 - cell.y0);
@@ -81,6 +83,7 @@ Cell summarize_cell(const DepthPicture& view, const splatting::RenderResult& ren
   cell.transmittance = 1.0 - alpha / pixels;
   if (!view.depth.empty()) cell.depth = median_depth(view.depth, cell);
   cell.measured = cell.depth > 0;
+  if (alpha > 0) cell.drawn_depth = depth / alpha;
   return cell;
 }
 
@@ -96,13 +99,20 @@ CellGrid summarize(const DepthPicture& view, const splatting::RenderResult& rend
   return grid;
 }
 
-/// Cells without a measurement take their depth from the nearest cells that have one, ring by ring; of several the
+/// What the map covers is where it is drawn.
+void take_drawn_depth(const SeedingOptions& options, CellGrid& grid) {
+  for (Cell& cell : grid.cells) {
+    if (cell.has_data && cell.transmittance <= options.min_transmittance) cell.depth = cell.drawn_depth;
+  }
+}
+
+/// Cells without a depth take that of the nearest cells that have one, ring by ring; of several the
 /// farthest, for what hides from one of two views, or is the sky behind a tree, lies behind.
 void fill_missing_depth(CellGrid& grid) {
   std::vector<std::pair<int, int>> ring, next;
   for (int row = 0; row < grid.rows; ++row) {
     for (int column = 0; column < grid.columns; ++column) {
-      if (grid.at(column, row).measured) ring.emplace_back(column, row);
+      if (grid.at(column, row).depth > 0) ring.emplace_back(column, row);
     }
   }
   for (int distance = 1; !ring.empty(); ++distance) {
@@ -197,10 +207,10 @@ void SeedingOptions::visit(OptionVisitor& v) {
 }
 
 std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const DepthPicture& view,
-                                            const splatting::RenderResult& render, int cell_size,
-                                            double min_color_error) {
+                                            const splatting::RenderResult& render, const SeedingRound& round) {
   if (!options.dense) return {};
-  CellGrid grid = summarize(view, render, cell_size);
+  CellGrid grid = summarize(view, render, round.cell);
+  if (round.fills_holes && view.depth.empty()) take_drawn_depth(options, grid);
   fill_missing_depth(grid);
 
   std::vector<splatting::Gaussian> seeds;
@@ -209,9 +219,9 @@ std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const
       const Cell& cell = grid.at(column, row);
       if (!(cell.depth > 0) || !cell.has_data) continue;
       const bool uncovered = cell.transmittance > options.min_transmittance;
-      const bool wrong_color = cell.color_error > min_color_error;
+      const bool wrong_color = cell.color_error > round.min_color_error;
       if (!uncovered && !(cell.measured && wrong_color)) continue;
-      const double sigma = options.sigma_cells * cell_size * cell.depth / view.camera.fx;
+      const double sigma = options.sigma_cells * round.cell * cell.depth / view.camera.fx;
       seeds.push_back(make_disc(options, view.camera.unproject(cell.center(), cell.depth),
                                 surface_normal(grid, view.camera, column, row), sigma, cell.color));
     }

@@ -29,6 +29,15 @@ struct SeedingOptions {
   void visit(OptionVisitor& visitor);
 };
 
+/// What one look at a picture is to find.
+struct SeedingRound {
+  int cell;                ///< Side of the cells, in pixels of the picture.
+  double min_color_error;  ///< Cells are seeded whose mean colour is off by more (squared, all channels).
+  /// In a picture without depth the holes of the map take the depth that is drawn around them. For an old keyframe:
+  /// what a new one sees first is no hole, and is worth a measurement when there is enough of it.
+  bool fills_holes = false;
+};
+
 /// New gaussians in the frame of the view's camera.
 ///
 /// A cell of the image becomes one gaussian, a disc on the measured surface as large as its cell, where `render` (of
@@ -36,10 +45,8 @@ struct SeedingOptions {
 /// what is drawn is no reason: where it looks right, it is more often the measurement that is wrong.
 /// Cells without depth take the nearest measured one, of several the farthest, and only where the map is transparent.
 /// Cells without data in three quarters of their pixels are left out.
-///
-/// `cell` is in pixels of `view`.
 std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const DepthPicture& view,
-                                            const splatting::RenderResult& render, int cell, double min_color_error);
+                                            const splatting::RenderResult& render, const SeedingRound& round);
 
 /// Share of the cells with data that `render` leaves mostly transparent or shows in another colour.
 double unexplained_share(const SeedingOptions& options, const DepthPicture& view, const splatting::RenderResult& render,

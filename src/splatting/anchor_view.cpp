@@ -12,6 +12,9 @@
 namespace photoslam::splatting {
 namespace {
 
+/// Variance of a pixel [px²].
+constexpr float kLowPass = 0.3f;
+
 /// Whether the intrinsics are numbers. Comparisons below would let some that are not through: what a conversion of them
 /// to an integer gives differs between processors.
 bool is_sane(const Camera& camera) {
@@ -21,7 +24,7 @@ bool is_sane(const Camera& camera) {
 
 }  // namespace
 
-AnchorView make_anchor_view(const Pose& pose, const Camera& camera, float near) {
+AnchorView make_anchor_view(const Pose& pose, const Camera& camera, const RenderOptions& options) {
   AnchorView view{};
   const double* r = pose.rotation;
   const double* t = pose.translation;
@@ -46,7 +49,11 @@ AnchorView make_anchor_view(const Pose& pose, const Camera& camera, float near) 
   view.max_x = (w - 0.5f - camera.cx + 0.15f * w) / camera.fx;
   view.min_y = (-(camera.cy + 0.5f) - 0.15f * h) / camera.fy;
   view.max_y = (h - 0.5f - camera.cy + 0.15f * h) / camera.fy;
-  view.near = is_sane(camera) ? near : std::numeric_limits<float>::infinity();  // nothing lies beyond it
+  view.near = is_sane(camera) ? options.near : std::numeric_limits<float>::infinity();  // nothing lies beyond it
+  // The mean of s² pixels spreads their variance by that of their positions, (s² − 1) / 12 pixels of the full picture.
+  const float area = static_cast<float>(options.shrink_factor * options.shrink_factor);
+  view.full_low_pass = kLowPass / area;
+  view.low_pass = view.full_low_pass + (1.0f - 1.0f / area) / 12.0f;
   return view;
 }
 

@@ -6,6 +6,7 @@ namespace photoslam::splatting {
 
 struct Camera;
 struct Pose;
+struct RenderOptions;
 
 /// A camera as seen from one anchor. The centre is split in two floats, so that subtracting it from a mean is exact to
 /// fp32 of the difference, however far from the anchor's origin both are.
@@ -16,9 +17,11 @@ struct AnchorView {
   float fx, fy, cx, cy;
   float min_x, max_x, min_y, max_y;  ///< Clamp of x/z and y/z in the Jacobian.
   float near;
+  float low_pass;       ///< Variance added to the screen covariance [px²] …
+  float full_low_pass;  ///< … of which this is added in the full picture, where peaks are as high as opacities [px²].
 };
 
-/// `near`: gaussians at this depth or before it are not drawn [m]. Nothing is, through intrinsics that are not numbers.
-AnchorView make_anchor_view(const Pose& camera_from_anchor, const Camera& camera, float near);
+/// Through intrinsics that are not numbers nothing is drawn.
+AnchorView make_anchor_view(const Pose& camera_from_anchor, const Camera& camera, const RenderOptions& options);
 
 }  // namespace photoslam::splatting

@@ -63,13 +63,11 @@ struct Projection {
   T scale[3];
   T axes[9];       ///< Rotation * diag(scale): the half axes, anchor frame, as columns.
   T m[9];          ///< The same in the camera frame.
-  T v0[3], v1[3];  ///< Half axes projected to the image: covariance = [v0; v1] [v0; v1]ᵀ + 0.3 I  [px].
+  T v0[3], v1[3];  ///< Half axes projected to the image: covariance = [v0; v1] [v0; v1]ᵀ + low-pass  [px].
   T a, b, c, det;  ///< 2D covariance [[a, b], [b, c]] and its determinant.
+  T full_det;      ///< The same determinant in the picture that was shrunk, in these pixels.
   T u, v;          ///< Screen position [px].
 };
-
-/// Variance added to the screen covariance [px²].
-inline constexpr float kLowPass = 0.3f;
 
 /// (w, x, y, z) normalised → row-major rotation matrix.
 template <class T>
@@ -129,9 +127,11 @@ PHOTOSLAM_FORMULA void project(const AnchorView& view, const T* mean, const T* r
   g.b = dot3(g.v0, g.v1);
   const T minors[3] = {g.v0[0] * g.v1[1] - g.v0[1] * g.v1[0], g.v0[1] * g.v1[2] - g.v0[2] * g.v1[1],
                        g.v0[2] * g.v1[0] - g.v0[0] * g.v1[2]};
-  g.det = dot3(minors, minors) + mul_add(T(kLowPass), a + c, T(kLowPass * kLowPass));
-  g.a = a + T(kLowPass);
-  g.c = c + T(kLowPass);
+  const T low_pass(view.low_pass), full_low_pass(view.full_low_pass), trace = a + c, squares = dot3(minors, minors);
+  g.det = squares + low_pass * (trace + low_pass);
+  g.full_det = squares + full_low_pass * (trace + full_low_pass);
+  g.a = a + low_pass;
+  g.c = c + low_pass;
 }
 
 /// dL/d of what blending sees of one gaussian.
@@ -142,17 +142,24 @@ struct ScreenGradient {
   T z;              ///< Depth.
 };
 
+/// Opacity over the height of the peak, at least 1: shrinking a picture spreads a gaussian and keeps its volume.
+template <class T>
+PHOTOSLAM_FORMULA T flattening(const Projection<T>& g) {
+  return square_root(g.det / g.full_det);
+}
+
 /// What blending leaves of one gaussian: sums over pixels of h = dL/d(ln alpha) times powers of t = dx − slope dy and
-/// dy
-/// ((dx, dy) = pixel − screen position, slope = b/c), and of dL/d(depth).
+/// dy ((dx, dy) = pixel − screen position, slope = b/c), and of dL/d(depth).
 template <class T>
 struct PixelSums {
-  T t, dy, tt, t_dy, dy_dy, z;
+  T one, t, dy, tt, t_dy, dy_dy, z;
 };
 
-/// With e = covariance⁻¹ (dx, dy): e.x = a1 t, e.y = c1 dy − slope a1 t where a1 = c/det, c1 = 1/c.
+/// With e = covariance⁻¹ (dx, dy): e.x = a1 t, e.y = c1 dy − slope a1 t where a1 = c/det, c1 = 1/c. The logarithm of
+/// the flattening adds the difference of the inverse covariances.
 template <class T>
-PHOTOSLAM_FORMULA ScreenGradient<T> screen_gradient(const Projection<T>& g, const PixelSums<T>& sums) {
+PHOTOSLAM_FORMULA ScreenGradient<T> screen_gradient(const AnchorView& view, const Projection<T>& g,
+                                                    const PixelSums<T>& sums) {
   const T c1 = T(1.0f) / g.c, a1 = g.c / g.det;
   const T along = g.b * c1 * a1;  // slope a1
   ScreenGradient<T> s;
@@ -161,6 +168,10 @@ PHOTOSLAM_FORMULA ScreenGradient<T> screen_gradient(const Projection<T>& g, cons
   s.exx = a1 * a1 * sums.tt;
   s.exy = a1 * (c1 * sums.t_dy - along * sums.tt);
   s.eyy = c1 * c1 * sums.dy_dy + along * (along * sums.tt - (c1 + c1) * sums.t_dy);
+  const T spread(view.low_pass - view.full_low_pass), inv = sums.one / g.det, full_inv = sums.one / g.full_det;
+  s.exx = s.exx + ((g.c - spread) * full_inv - g.c * inv);
+  s.exy = s.exy + g.b * (inv - full_inv);
+  s.eyy = s.eyy + ((g.a - spread) * full_inv - g.a * inv);
   s.z = sums.z;
   return s;
 }

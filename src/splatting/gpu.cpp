@@ -215,7 +215,7 @@ cuda::DeviceView Gpu::device_view(const GaussianModel& model, const View& view, 
   PHOTOSLAM_CHECK(view.camera.width >= 1 && view.camera.height >= 1, "{}x{}", view.camera.width, view.camera.height);
   state_->anchors.clear();
   for (const Pose& pose : view.camera_from_anchor)
-    state_->anchors.push_back(make_anchor_view(pose, view.camera, options.near));
+    state_->anchors.push_back(make_anchor_view(pose, view.camera, options));
   cuda::DeviceView device;
   device.width = view.camera.width;
   device.height = view.camera.height;
@@ -237,8 +237,9 @@ std::optional<StepResult> Gpu::step(GaussianModel& model, const View& view, cons
     std::copy_n(options.exposure.bias, 3, loss.bias);
     loss.ssim_weight = options.ssim_weight;
     loss.depth_weight = options.depth_weight;
-    const cuda::Figures figures = state_->engine->step(on_device, device_target(state_, target, options.target_factor),
-                                                       loss, make_update_constants(options), options.update);
+    const cuda::Figures figures =
+        state_->engine->step(on_device, device_target(state_, target, options.render.shrink_factor), loss,
+                             make_update_constants(options), options.update);
     if (options.update) model.trained_remotely();
     result = step_result(figures, options);
     state_->busy_ms += result->times.total();

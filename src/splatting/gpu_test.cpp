@@ -193,8 +193,8 @@ void expect_steps_of_any_size_as_on_the_cpu(const std::shared_ptr<Gpu>& gpu) {
     scene.build(static_cast<uint64_t>(round));
     TrainOptions options = train_options(scene);
     options.update = false;
-    options.target_factor = 1 + random.index(4);
-    const TargetImage target = make_target(scene, 66, options.target_factor);
+    options.render.shrink_factor = 1 + random.index(4);
+    const TargetImage target = make_target(scene, 66, options.render.shrink_factor);
     Trainer cpu, remote(gpu);
     const StepResult want = cpu.step(scene.model, scene.view, target, options, executor);
     expect_close(remote.step(scene.model, scene.view, target, options, executor), want);

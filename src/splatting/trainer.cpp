@@ -31,7 +31,7 @@ Trainer& Trainer::operator=(Trainer&&) noexcept = default;
 
 StepResult Trainer::step(GaussianModel& model, const View& view, const TargetImage& target, const TrainOptions& options,
                          Executor& executor) {
-  const int factor = options.target_factor;
+  const int factor = options.render.shrink_factor;
   PHOTOSLAM_CHECK(
       factor >= 1 && target.width() / factor == view.camera.width && target.height() / factor == view.camera.height,
       "target {}x{}, shrunk by {}, camera {}x{}", target.width(), target.height(), factor, view.camera.width,

@@ -34,7 +34,6 @@ struct TrainOptions {
   float ssim_weight = 0.2f;     ///< λ of paper Eq. (4); 0 skips SSIM and is much cheaper.
   float depth_weight = 0;       ///< Weight of the depth loss; ignored when the target has no depth.
   float opacity_weight = 0;     ///< Weight of the mean opacity of the visible gaussians.
-  int target_factor = 1;        ///< The view shows the target at 1/target_factor of its resolution.
   Exposure exposure;            ///< Applied to the render before the photometric loss.
   bool update = true;           ///< false: gaussians, optimiser state and statistics stay as they are.
 };
@@ -73,7 +72,7 @@ class Trainer {
   Trainer(Trainer&&) noexcept;
   Trainer& operator=(Trainer&&) noexcept;
 
-  /// One optimisation step on one view; the target, shrunk by target_factor, has the size of the camera.
+  /// One optimisation step on one view; the target, shrunk as the render is, has the size of the camera.
   StepResult step(GaussianModel& model, const View& view, const TargetImage& target, const TrainOptions& options,
                   Executor& executor);
 

@@ -26,6 +26,9 @@ struct View {
 
 struct RenderOptions {
   float near = 0.01f;  ///< Gaussians whose centre lies at z <= near are not drawn [m].
+  /// The picture is a larger one shrunk by this: each pixel the mean of so many² of its pixels, as gaussians, too, are
+  /// drawn.
+  int shrink_factor = 1;
   float background[3] = {0, 0, 0};
   int sh_degree = 3;  ///< At most this degree; the model's own degree is the other bound.
 };

@@ -133,6 +133,38 @@ TEST_P(Engine, OneSplatHasTheClosedForm) {
     }
 }
 
+TEST_P(Engine, AShrunkPictureIsTheMeanOfItsPixels) {
+  GaussianModel model;
+  model.add_anchor();
+  Gaussian g;
+  g.mean[2] = 1;
+  const float sigma_px[] = {0.8f, 1.5f, 4.0f};
+  for (int i = 0; i < 3; ++i) g.log_scale[i] = std::log(sigma_px[i] / 50);
+  g.rotation[3] = 0.4f;
+  g.opacity_logit = 3;
+  model.add(0, {&g, 1});
+  const std::vector<Pose> poses(1);
+  Renderer renderer;
+  RenderResult full, shrunk;
+  renderer.render(model, {{48, 48, 50, 50, 20, 21}, poses}, {}, executor, full);
+  for (const int factor : {2, 4}) {
+    const auto f = static_cast<float>(factor);
+    const Camera camera{48 / factor, 48 / factor, 50 / f, 50 / f, 20.5f / f - 0.5f, 21.5f / f - 0.5f};
+    renderer.render(model, {camera, poses}, {.shrink_factor = factor}, executor, shrunk);
+    double worst = 0, highest = 0;
+    for (int y = 0; y < camera.height; ++y)
+      for (int x = 0; x < camera.width; ++x) {
+        double mean = 0;
+        for (int i = 0; i < factor * factor; ++i)
+          mean += full.alpha[static_cast<size_t>((factor * y + i / factor) * 48 + factor * x + i % factor)] / f / f;
+        highest = std::max(highest, mean);
+        worst = std::max(worst, std::abs(mean - shrunk.alpha[static_cast<size_t>(y * camera.width + x)]));
+      }
+    EXPECT_GT(highest, 0.3);
+    EXPECT_LE(worst, 0.06 * highest) << factor;  // a square is not a gaussian
+  }
+}
+
 TEST_P(Engine, NearSplatsHideFarOnesUntilTransmittanceIsSpent) {
   GaussianModel model;
   model.add_anchor();

@@ -49,7 +49,7 @@ HWY_INLINE Mask project_lanes(const Block& block, const AnchorView& view, int wi
   project(view, mean, rotation, log_scale, g);
 
   const Lanes logit = load(block.parameters[row::kOpacity] + lane);
-  const Lanes log2_opacity = -logarithm2(Lanes(1.0f) + exponential(minimum(-logit, Lanes(80.0f))));
+  const Lanes log2_opacity = -logarithm2(flattening(g) * (Lanes(1.0f) + exponential(minimum(-logit, Lanes(80.0f)))));
   const Lanes cut = log2_opacity + Lanes(kLog2Cut);
   const Lanes radius2 = cut * Lanes(2.0f * 0.6931471805599453f);
   const Lanes extent_x = square_root(radius2 * g.a), extent_y = square_root(radius2 * g.c);
@@ -231,7 +231,7 @@ void project_model(const GaussianModel& model, const View& view, const RenderOpt
   std::copy_n(options.background, 3, frame.background);
   frame.anchors.clear();
   for (const Pose& pose : view.camera_from_anchor)
-    frame.anchors.push_back(make_anchor_view(pose, view.camera, options.near));
+    frame.anchors.push_back(make_anchor_view(pose, view.camera, options));
 
   frame.blocks.clear();
   for (size_t b = 0; b < model.num_blocks(); ++b) {

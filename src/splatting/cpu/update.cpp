@@ -176,7 +176,7 @@ void write_dense(const BlockGradients& gradients, int degree, float* dense) {
 
 HWY_INLINE PixelSums<Lanes> pixel_sums(const float (*rows)[kBlockSize], size_t lane) {
   const auto record = [&](int i) { return load(rows[i] + lane); };
-  return {record(kT), record(kDy), record(kTT), record(kTDy), record(kDyDy), record(kDepth)};
+  return {record(kOne), record(kT), record(kDy), record(kTT), record(kTDy), record(kDyDy), record(kDepth)};
 }
 
 HWY_INLINE void update_statistics(Block& block, size_t lane, LaneMask mask, Lanes half_width, Lanes half_height,
@@ -221,7 +221,7 @@ void backward_block(const Frame& frame, size_t rank, const Block& block, const B
     for (int k = 0; k < 3; ++k) log_scale[k] = load(block.parameters[row::kLogScale + k] + lane);
     Projection<Lanes> g;
     project(view, mean, rotation, log_scale, g);
-    const ScreenGradient<Lanes> s = screen_gradient(g, pixel_sums(rows, lane));
+    const ScreenGradient<Lanes> s = screen_gradient(view, g, pixel_sums(rows, lane));
     const Lanes color[3] = {load(rows[kRed] + lane), load(rows[kRed + 1] + lane), load(rows[kRed + 2] + lane)};
     const Lanes size = absolute(s.u) + absolute(s.v) + absolute(s.exx) + absolute(s.eyy) + absolute(s.exy) +
                        absolute(s.z) + absolute(color[0]) + absolute(color[1]) + absolute(color[2]);

@@ -39,7 +39,7 @@ struct OnDevice {
         plane(scene.plane()),
         num_blocks(scene.model.num_blocks()) {
     for (const splatting::Pose& pose : scene.poses)
-      anchors.push_back(make_anchor_view(pose, scene.view.camera, scene.options.near));
+      anchors.push_back(make_anchor_view(pose, scene.view.camera, scene.options));
     view.width = scene.width;
     view.height = scene.height;
     view.sh_degree = std::min(scene.options.sh_degree, scene.model.sh_degree());

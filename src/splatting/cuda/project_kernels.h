@@ -131,7 +131,7 @@ struct ProjectKernel {
     const AnchorView& view = views[block.anchor];
     const scalar::Projection<float> g = project_lane(block, lane, view);
     const float logit = block.parameters[row::kOpacity][lane];
-    s.log2_opacity = -log2f(1.0f + expf(fminf(-logit, 80.0f)));
+    s.log2_opacity = -log2f(scalar::flattening(g) * (1.0f + expf(fminf(-logit, 80.0f))));
     const float cut = s.log2_opacity + kLog2Cut;
     const float radius2 = cut * (2.0f * 0.6931471805599453f), half_log2e = 0.5f * 1.4426950408889634f;
     const float inv_c = 1.0f / g.c, inv_det = 1.0f / g.det;

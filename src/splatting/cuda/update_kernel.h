@@ -91,7 +91,7 @@ struct UpdateKernel {
                                       scalar::ScreenGradient<float>& s, Gradient& out) const {
     const AnchorView& view = views[block.anchor];
     const scalar::Projection<float> g = project_lane(block, lane, view);
-    s = scalar::screen_gradient<float>(g, {sum.t, sum.dy, sum.tt, sum.t_dy, sum.dy_dy, sum.z});
+    s = scalar::screen_gradient<float>(view, g, {sum.one, sum.t, sum.dy, sum.tt, sum.t_dy, sum.dy_dy, sum.z});
     const float size = fabsf(s.u) + fabsf(s.v) + fabsf(s.exx) + fabsf(s.eyy) + fabsf(s.exy) + fabsf(s.z) +
                        fabsf(sum.rgb[0]) + fabsf(sum.rgb[1]) + fabsf(sum.rgb[2]);
     if (!(size < kAbsurd)) return false;

@@ -49,7 +49,7 @@ struct Setup {
   UpdateConstants constants;
 
   explicit Setup(const Scene& scene) : rgb(3 * scene.plane(), 128) {
-    anchors.push_back(make_anchor_view(scene.poses[0], scene.view.camera, 0.01f));
+    anchors.push_back(make_anchor_view(scene.poses[0], scene.view.camera, RenderOptions()));
     view.width = scene.width;
     view.height = scene.height;
     view.sh_degree = 3;

@@ -29,6 +29,7 @@ struct View {
   int width = 0, height = 0;
   double fx = 0, fy = 0, cx = 0, cy = 0;
   double near = 0.01;
+  int shrink_factor = 1;
   std::array<double, 3> background{0, 0, 0};
   int sh_degree = 3;
   std::vector<Pose> camera_from_anchor;

@@ -90,7 +90,8 @@ struct Projected {
   double u = 0, v = 0;
   double a = 0, b = 0, c = 0;  // covariance
   double conic_a = 0, conic_b = 0, conic_c = 0;
-  double opacity = 0;
+  double full_a = 0, full_c = 0;  // of the covariance in the picture that was shrunk, in these pixels
+  double opacity = 0, peak = 0;
   Vec3 color{};
   std::array<bool, 3> clamped{};
 };
@@ -159,14 +160,19 @@ Projected project(const Gaussian& gaussian, const View& view) {
       for (int k = 0; k < 3; ++k) sum += jac.j[r][i] * cov[i][k] * jac.j[s][k];
     return sum;
   };
-  out.a = form(0, 0) + 0.3;
+  // A pixel of the full picture has a variance of 0.3, s² pixels side by side spread by another (s² − 1) / 12.
+  const double s2 = view.shrink_factor * view.shrink_factor, spread = (s2 - 1) / 12 / s2;
+  out.full_a = form(0, 0) + 0.3 / s2;
+  out.full_c = form(1, 1) + 0.3 / s2;
+  out.a = out.full_a + spread;
   out.b = form(0, 1);
-  out.c = form(1, 1) + 0.3;
+  out.c = out.full_c + spread;
   const double det = out.a * out.c - out.b * out.b;
   out.conic_a = out.c / det;
   out.conic_b = -out.b / det;
   out.conic_c = out.a / det;
   out.opacity = 1 / (1 + std::exp(-g[10]));
+  out.peak = out.opacity * std::sqrt((out.full_a * out.full_c - out.b * out.b) / det);
   const Vec3 center = camera_center(pose);
   Vec3 d{g[0] - center[0], g[1] - center[1], g[2] - center[2]};
   const double norm = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
@@ -211,7 +217,7 @@ struct Scene {
       const Projected& p = projected[i];
       const double dx = x - p.u, dy = y - p.v;
       const double power = -0.5 * (p.conic_a * dx * dx + p.conic_c * dy * dy) - p.conic_b * dx * dy;
-      const double raw = p.opacity * std::exp(power), alpha = std::min(0.99, raw);
+      const double raw = p.peak * std::exp(power), alpha = std::min(0.99, raw);
       if (std::abs(raw * 255 - 1) < noise * 10) ambiguous = true;
       if (raw < 1.0 / 255) continue;
       if (std::abs(raw / 0.99 - 1) < noise) ambiguous = true;
@@ -270,6 +276,11 @@ void geometry_backward(const Gaussian& gaussian, const View& view, const Project
     for (int j = 0; j < 2; ++j)
       for (int m = 0; m < 2; ++m)
         for (int n = 0; n < 2; ++n) gcov[i][j] -= k[i][m] * gk[m][n] * k[n][j];
+  // The logarithm of the peak holds half that of the determinants' ratio: dL/dCov = (Full⁻¹ − Conic) dL/d(ln peak) / 2.
+  const double full_det = p.full_a * p.full_c - p.b * p.b, half = 0.5 * s.opacity * p.opacity;
+  const double full[2][2] = {{p.full_c / full_det, -p.b / full_det}, {-p.b / full_det, p.full_a / full_det}};
+  for (int i = 0; i < 2; ++i)
+    for (int j = 0; j < 2; ++j) gcov[i][j] += half * (full[i][j] - k[i][j]);
 
   const Jacobian jac = jacobian(p.camera, view);
   const Mat3 cov = camera_covariance(g, w);
@@ -439,7 +450,7 @@ struct TestScene {
   }
 };
 
-TestScene make_scene() {
+TestScene make_scene(int shrink_factor) {
   Random random(5);
   TestScene scene;
   scene.view = {.width = 29,
@@ -448,6 +459,7 @@ TestScene make_scene() {
                 .fy = 33,
                 .cx = 12.3,
                 .cy = 11.8,
+                .shrink_factor = shrink_factor,
                 .background = {0.2, 0.4, 0.1},
                 .camera_from_anchor = {Pose{{0.8, 0, 0.6, 0, 1, 0, -0.6, 0, 0.8}, {0.1, -0.2, 0.3}}}};
   for (int i = 0; i < 40; ++i) {
@@ -480,8 +492,12 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-TEST(ReferenceRasterizer, GradientsAgreeWithFiniteDifferences) {
-  const TestScene scene = make_scene();
+/// The parameter is the factor by which the picture was shrunk.
+class ReferenceRasterizer : public ::testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Shrunk, ReferenceRasterizer, ::testing::Values(1, 3));
+
+TEST_P(ReferenceRasterizer, GradientsAgreeWithFiniteDifferences) {
+  const TestScene scene = make_scene(GetParam());
   const Gradients analytic = backward(scene.gaussians, scene.view, scene.dl_drgb, scene.dl_ddepth, scene.dl_dalpha);
   Random random(6);
   std::vector<double> errors;
@@ -502,8 +518,8 @@ TEST(ReferenceRasterizer, GradientsAgreeWithFiniteDifferences) {
   EXPECT_LE(errors[errors.size() * 95 / 100], 1e-4);  // the rest crossed a threshold
 }
 
-TEST(ReferenceRasterizer, PoseGradientAgreesWithFiniteDifferences) {
-  const TestScene scene = make_scene();
+TEST_P(ReferenceRasterizer, PoseGradientAgreesWithFiniteDifferences) {
+  const TestScene scene = make_scene(GetParam());
   const Gradients analytic = backward(scene.gaussians, scene.view, scene.dl_drgb, scene.dl_ddepth, scene.dl_dalpha);
   for (int k = 0; k < 6; ++k) {
     const double h = 1e-6;

@@ -20,6 +20,7 @@ struct Scene {
   int count = 250;
   int anchors = 1;
   int sh_degree = 3;
+  int shrink_factor = 1;
   double depth_min = 0.6, depth_max = 5;
   double spread = 1.1;  ///< Directions reach this far beyond the image border (1 = border).
   double log_scale_min = -4.5, log_scale_max = -1.2;

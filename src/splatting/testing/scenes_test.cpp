@@ -28,6 +28,7 @@ void Scene::build(uint64_t seed) {
                  0.43f * static_cast<float>(width),
                  0.56f * static_cast<float>(height)};  // off-centre
   options.sh_degree = sh_degree;
+  options.shrink_factor = shrink_factor;
   for (float& b : options.background) b = static_cast<float>(random.uniform());
   const Camera& c = view.camera;
   reference_view = {.width = width,
@@ -37,6 +38,7 @@ void Scene::build(uint64_t seed) {
                     .cx = c.cx,
                     .cy = c.cy,
                     .near = options.near,
+                    .shrink_factor = shrink_factor,
                     .background = {options.background[0], options.background[1], options.background[2]},
                     .sh_degree = sh_degree,
                     .camera_from_anchor = {}};
@@ -109,6 +111,12 @@ std::vector<Scene> hard_scenes() {
   tiny.log_scale_min = -12;
   tiny.log_scale_max = -6;
   tiny.image_tolerance = 2e-5;
+  scene("shrunk").shrink_factor = 2;
+  Scene& shrunk = scene("shrunk_to_a_quarter");
+  shrunk.shrink_factor = 4;
+  shrunk.log_scale_min = -7;
+  shrunk.log_scale_max = -4;
+  shrunk.image_tolerance = 2e-5;
   Scene& needles = scene("needles");
   needles.needle = 2.5;
   needles.log_scale_min = -4;
