@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "splatting/cuda/device_memory.h"
@@ -16,40 +17,35 @@ class Undistorter final : public DeviceUndistorter {
  public:
   Undistorter(Device device, std::shared_ptr<Budget> budget, const DeviceLens* lenses, int count)
       : device_(std::move(device)), memory_(device_, std::move(budget)) {
-    for (int i = 0; i < count; ++i) {
-      Lens lens{lenses[i], Array<Tap, Device>(memory_)};
+    for (const DeviceLens& plain : std::span(lenses, static_cast<size_t>(count))) {
+      Lens lens{plain, Array<Tap, Device>(memory_)};
       lens.taps.take(lens.target_pixels());
-      device_.upload(lens.taps.data(), lenses[i].taps, lens.target_pixels() * sizeof(Tap));
+      device_.upload(lens.taps.data(), plain.taps, lens.target_pixels() * sizeof(Tap));
       lenses_.push_back(std::move(lens));
     }
+    device_.finish();  // frames find the pinned memory free
   }
 
   /// Pinned memory for a frame: both ways, color and depth of every lens.
   static size_t staging_bytes(const DeviceLens* lenses, int count) {
     size_t bytes = 0;
-    for (const DeviceLens* lens = lenses; lens < lenses + count; ++lens)
-      bytes += 5 * (pixels(lens->width, lens->height) + pixels(lens->target_width, lens->target_height)) + kAlignment;
+    for (const DeviceLens& lens : std::span(lenses, static_cast<size_t>(count)))
+      bytes += 5 * (pixels(lens.width, lens.height) + pixels(lens.target_width, lens.target_height));
     return bytes;
   }
 
   void undistort(const DevicePicture* pictures, int count) override {
+    const std::span all(pictures, static_cast<size_t>(count));
     size_t room = 0;
-    for (const DevicePicture* picture = pictures; picture < pictures + count; ++picture) {
-      const Lens& lens = lenses_.at(static_cast<size_t>(picture->lens));
-      room += aligned(lens.pixels() * bytes_per_pixel(*picture));
-      room += aligned(lens.target_pixels() * bytes_per_pixel(*picture));
-    }
+    for (const DevicePicture& picture : all) room += aligned(bytes_before(picture)) + aligned(bytes_after(picture));
     if (room > pixels_.size()) pixels_.take(room);
     uint8_t* place = pixels_.data();
-    for (const DevicePicture* picture = pictures; picture < pictures + count; ++picture) {
-      const Lens& lens = lenses_.at(static_cast<size_t>(picture->lens));
-      const size_t bytes = lens.pixels() * bytes_per_pixel(*picture);
-      const size_t target_bytes = lens.target_pixels() * bytes_per_pixel(*picture);
-      uint8_t* const target = place + aligned(bytes);
-      device_.upload(place, picture->distorted, bytes);
-      launch(lens, picture->kind, place, target);
-      device_.download_later(picture->target, target, target_bytes);
-      place = target + aligned(target_bytes);
+    for (const DevicePicture& picture : all) {
+      uint8_t* const target = place + aligned(bytes_before(picture));
+      device_.upload(place, picture.distorted, bytes_before(picture));
+      launch(picture, place, target);
+      device_.download_later(picture.target, target, bytes_after(picture));
+      place = target + aligned(bytes_after(picture));
     }
     device_.finish();
   }
@@ -66,19 +62,27 @@ class Undistorter final : public DeviceUndistorter {
 
   static size_t pixels(int width, int height) { return static_cast<size_t>(width) * static_cast<size_t>(height); }
   static size_t aligned(size_t bytes) { return (bytes + kAlignment - 1) / kAlignment * kAlignment; }
-  static size_t bytes_per_pixel(const DevicePicture& picture) {
-    return picture.kind == DevicePicture::Kind::rgb ? 3 : picture.kind == DevicePicture::Kind::depth ? 2 : 1;
+  static size_t bytes_per_pixel(DevicePicture::Kind kind) {
+    return kind == DevicePicture::Kind::rgb ? 3 : kind == DevicePicture::Kind::depth ? 2 : 1;
+  }
+  const Lens& lens_of(const DevicePicture& picture) const { return lenses_.at(static_cast<size_t>(picture.lens)); }
+  size_t bytes_before(const DevicePicture& picture) const {
+    return lens_of(picture).pixels() * bytes_per_pixel(picture.kind);
+  }
+  size_t bytes_after(const DevicePicture& picture) const {
+    return lens_of(picture).target_pixels() * bytes_per_pixel(picture.kind);
   }
 
-  void launch(const Lens& lens, DevicePicture::Kind kind, uint8_t* distorted, uint8_t* target) {
+  void launch(const DevicePicture& picture, const uint8_t* distorted, uint8_t* target) {
+    const Lens& lens = lens_of(picture);
     const size_t count = lens.target_pixels(), width = static_cast<size_t>(lens.size.width);
     const int blocks = static_cast<int>((count + UndistortColor::kThreads - 1) / UndistortColor::kThreads);
     static_assert(UndistortColor::kThreads == UndistortDepth::kThreads);
-    if (kind == DevicePicture::Kind::depth)
+    if (picture.kind == DevicePicture::Kind::depth)
       device_.launch(blocks, UndistortDepth{lens.taps.data(), count, reinterpret_cast<const uint16_t*>(distorted),
                                             width, reinterpret_cast<uint16_t*>(target)});
     else
-      device_.launch(blocks, UndistortColor{lens.taps.data(), count, kind == DevicePicture::Kind::rgb ? 3 : 1,
+      device_.launch(blocks, UndistortColor{lens.taps.data(), count, static_cast<int>(bytes_per_pixel(picture.kind)),
                                             distorted, width, target});
   }
 
