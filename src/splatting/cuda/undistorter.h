@@ -73,6 +73,7 @@ class Undistorter final : public DeviceUndistorter {
     return lens_of(picture).target_pixels() * bytes_per_pixel(picture.kind);
   }
 
+  // NOLINTNEXTLINE(readability-non-const-parameter): the kernel writes to it
   void launch(const DevicePicture& picture, const uint8_t* distorted, uint8_t* target) {
     const Lens& lens = lens_of(picture);
     const size_t count = lens.target_pixels(), width = static_cast<size_t>(lens.size.width);

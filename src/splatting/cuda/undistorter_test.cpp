@@ -70,7 +70,7 @@ struct Case {
 };
 
 /// Frames of a color camera with depth, and of a grey one of another size.
-void expect_frames_as_by_plain_code(TestDevice device, size_t staging_bytes) {
+void expect_frames_as_by_plain_code(const TestDevice& device, size_t staging_bytes) {
   Random random(71);
   const std::vector<WildLens> lenses = {{random, 37, 23, 41, 19}, {random, 2, 2, 300, 3}};
   const DeviceLens plain[] = {lenses[0].plain(), lenses[1].plain()};

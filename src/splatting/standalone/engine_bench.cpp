@@ -82,8 +82,8 @@ class FrameBench {
       : width_(width), pixels_(static_cast<size_t>(width) * static_cast<size_t>(height)), taps_(pixels_) {
     const double cx = (width - 1) / 2.0, cy = (height - 1) / 2.0;
     for (size_t i = 0; i < pixels_; ++i) {
-      const double x = static_cast<double>(i % static_cast<size_t>(width)) - cx;
-      const double y = static_cast<double>(i / static_cast<size_t>(width)) - cy;
+      const size_t column = i % static_cast<size_t>(width), row = i / static_cast<size_t>(width);
+      const double x = static_cast<double>(column) - cx, y = static_cast<double>(row) - cy;
       const double scale = 1 - 0.1 * (x * x + y * y) / (cx * cx + cy * cy);
       const double u = 256 * (scale * x + cx), v = 256 * (scale * y + cy);
       taps_[i] = {static_cast<uint16_t>(u / 256), static_cast<uint16_t>(v / 256),
