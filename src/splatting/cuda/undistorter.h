@@ -35,24 +35,20 @@ class Undistorter final : public DeviceUndistorter {
   }
 
   void undistort(const DevicePicture* pictures, int count) override {
-    const std::span all(pictures, static_cast<size_t>(count));
-    size_t room = 0;
-    for (const DevicePicture& picture : all) room += aligned(bytes_before(picture)) + aligned(bytes_after(picture));
-    if (room > pixels_.size()) pixels_.take(room);
-    uint8_t* place = pixels_.data();
-    for (const DevicePicture& picture : all) {
-      uint8_t* const target = place + aligned(bytes_before(picture));
-      device_.upload(place, picture.distorted, bytes_before(picture));
-      launch(picture, place, target);
-      device_.download_later(picture.target, target, bytes_after(picture));
-      place = target + aligned(bytes_after(picture));
+    for (const DevicePicture& picture : std::span(pictures, static_cast<size_t>(count))) {
+      const Lens& lens = lenses_.at(static_cast<size_t>(picture.lens));
+      const size_t bytes = lens.pixels() * bytes_per_pixel(picture.kind);
+      const size_t target_bytes = lens.target_pixels() * bytes_per_pixel(picture.kind);
+      distorted_.reserve(bytes);
+      target_.reserve(target_bytes);
+      device_.upload(distorted_.data(), picture.distorted, bytes);
+      launch(lens, picture.kind);
+      device_.download_later(picture.target, target_.data(), target_bytes);
     }
     device_.finish();
   }
 
  private:
-  static constexpr size_t kAlignment = 256;
-
   struct Lens {
     DeviceLens size;
     Array<Tap, Device> taps;
@@ -61,36 +57,27 @@ class Undistorter final : public DeviceUndistorter {
   };
 
   static size_t pixels(int width, int height) { return static_cast<size_t>(width) * static_cast<size_t>(height); }
-  static size_t aligned(size_t bytes) { return (bytes + kAlignment - 1) / kAlignment * kAlignment; }
   static size_t bytes_per_pixel(DevicePicture::Kind kind) {
     return kind == DevicePicture::Kind::rgb ? 3 : kind == DevicePicture::Kind::depth ? 2 : 1;
   }
-  const Lens& lens_of(const DevicePicture& picture) const { return lenses_.at(static_cast<size_t>(picture.lens)); }
-  size_t bytes_before(const DevicePicture& picture) const {
-    return lens_of(picture).pixels() * bytes_per_pixel(picture.kind);
-  }
-  size_t bytes_after(const DevicePicture& picture) const {
-    return lens_of(picture).target_pixels() * bytes_per_pixel(picture.kind);
-  }
 
-  // NOLINTNEXTLINE(readability-non-const-parameter): the kernel writes to it
-  void launch(const DevicePicture& picture, const uint8_t* distorted, uint8_t* target) {
-    const Lens& lens = lens_of(picture);
+  void launch(const Lens& lens, DevicePicture::Kind kind) {
     const size_t count = lens.target_pixels(), width = static_cast<size_t>(lens.size.width);
     const int blocks = static_cast<int>((count + UndistortColor::kThreads - 1) / UndistortColor::kThreads);
     static_assert(UndistortColor::kThreads == UndistortDepth::kThreads);
-    if (picture.kind == DevicePicture::Kind::depth)
-      device_.launch(blocks, UndistortDepth{lens.taps.data(), count, reinterpret_cast<const uint16_t*>(distorted),
-                                            width, reinterpret_cast<uint16_t*>(target)});
+    if (kind == DevicePicture::Kind::depth)
+      device_.launch(
+          blocks, UndistortDepth{lens.taps.data(), count, reinterpret_cast<const uint16_t*>(distorted_.data()), width,
+                                 reinterpret_cast<uint16_t*>(target_.data())});
     else
-      device_.launch(blocks, UndistortColor{lens.taps.data(), count, static_cast<int>(bytes_per_pixel(picture.kind)),
-                                            distorted, width, target});
+      device_.launch(blocks, UndistortColor{lens.taps.data(), count, kind == DevicePicture::Kind::rgb ? 3 : 1,
+                                            distorted_.data(), width, target_.data()});
   }
 
   Device device_;
   Memory<Device> memory_;
   std::vector<Lens> lenses_;
-  Array<uint8_t, Device> pixels_{memory_};  // of one frame, before and after
+  Array<uint8_t, Device> distorted_{memory_}, target_{memory_};  // one picture after the other, as the stream has them
 };
 
 }  // namespace photoslam::splatting::cuda
