@@ -28,8 +28,10 @@ trap 'rm -rf "$scratch"' EXIT
   cat "$scratch/ptxas.log"
   exit 1
 }
-"$nvcc" -std=c++20 -Werror all-warnings -Isrc/splatting/standalone/include -Isrc -arch="sm_$newest" -x cu \
-  -c src/splatting/cuda/engine_test.cpp -o "$scratch/engine_test.o"
+for test in engine_test undistorter_test; do
+  "$nvcc" -std=c++20 -Werror all-warnings -Isrc/splatting/standalone/include -Isrc -arch="sm_$newest" -x cu \
+    -c "src/splatting/cuda/$test.cpp" -o "$scratch/$test.o"
+done
 python3 - "$scratch/ptxas.log" "$release" "${1:-}" <<'PYTHON'
 import re
 import sys

@@ -33,7 +33,7 @@ rule link
   command = $compiler -static -pthread \$in -o \$out
 RULES
 sources=("$googletest/src/gtest-all.cc" "$googletest/src/gtest_main.cc" src/base/clock.cpp src/base/executor.cpp src/base/module.cpp)
-while IFS= read -r file; do sources+=("$file"); done < <(find src/splatting -name '*.cpp' ! -name '*_benchmark.cpp' ! -path '*/cuda/*' ! -path '*/standalone/*' ! -name gpu_test.cpp | sort)
+while IFS= read -r file; do sources+=("$file"); done < <(find src/splatting -name '*.cpp' ! -name '*_benchmark.cpp' ! -path '*/cuda/*' ! -path '*/standalone/*' ! -name 'gpu*_test.cpp' | sort)
 {
   echo "include $build/rules.ninja"
   objects=()

@@ -165,6 +165,10 @@ Status run(const RunArguments& arguments) {
   }
   for (const std::string& message : outcome.messages) fmt::print(stderr, "  note: {}\n", message);
   report_failure(gpu->get());
+  if (outcome.gpu && !outcome.gpu->undistortion_failure.empty()) {
+    fmt::print(stderr, "  note: the GPU has failed to undistort ({}); from then on the CPU did it\n",
+               outcome.gpu->undistortion_failure);
+  }
   if (outcome.final.keyframes_from_world.empty()) {
     const std::string why = outcome.frames.empty() ? "no frame was read" : outcome.frames.back().reason;
     return error("nothing could be mapped: {}{}", why, outcome.failure.empty() ? "" : " (" + outcome.failure + ")");

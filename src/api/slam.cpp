@@ -124,6 +124,7 @@ SlamResult map_source(FrameSource& source, const SlamSettings& settings, const K
   if (run_settings.gpu) {
     result.gpu = run_settings.gpu->name();
     result.gpu_failure = run_settings.gpu->failure();
+    if (result.gpu_failure.empty() && run.gpu) result.gpu_failure = run.gpu->undistortion_failure;
   }
   result.failure = run.failure;
   return result;

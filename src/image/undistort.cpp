@@ -21,12 +21,8 @@ std::pair<uint16_t, uint16_t> split(double position, int size) {
 
 Undistorter::Undistorter(const PinholeCamera& lens, const Distortion& distortion, const PinholeCamera& result,
                          const Quat& result_from_lens)
-    : lens_width_(lens.width),
-      lens_height_(lens.height),
-      camera_(result),
-      mask_(result.width, result.height),
-      taps_(mask_.values().size()) {
-  PHOTOSLAM_CHECK(lens.width >= 2 && lens.height >= 2, "{}x{}", lens.width, lens.height);
+    : lens_(lens), camera_(result), mask_(result.width, result.height), taps_(mask_.values().size()) {
+  PHOTOSLAM_CHECK(lens.width >= 2 && lens.height >= 2 && lens.width <= Tap::kNowhere, "{}x{}", lens.width, lens.height);
   const Mat3 lens_from_result = result_from_lens.inverse().toRotationMatrix();
   Tap* tap = taps_.data();
   for (int y = 0; y < result.height; ++y) {
@@ -49,49 +45,27 @@ Undistorter::Undistorter(const PinholeCamera& lens, const Distortion& distortion
 /// The number of channels is known while compiling because this is on the way of every frame.
 template <int kChannels>
 void Undistorter::sample(const ImageU8& distorted, ImageU8& result) const {
-  const uint8_t* const mask = mask_.values().data();
+  const uint8_t* const source = distorted.values().data();
+  const size_t pitch = static_cast<size_t>(lens_.width) * kChannels;
   uint8_t* target = result.values().data();
-  for (size_t i = 0; i < taps_.size(); ++i, target += kChannels) {
-    if (mask[i] == 0) continue;
-    const Tap tap = taps_[i];
-    const uint8_t* const above = distorted.row(tap.y) + tap.x * kChannels;
-    const uint8_t* const below = distorted.row(tap.y + 1) + tap.x * kChannels;
-    const uint32_t left = 256u - tap.fx, right = tap.fx, up = 256u - tap.fy, down = tap.fy;
-    for (int c = 0; c < kChannels; ++c) {
-      const uint32_t sum = up * (left * above[c] + right * above[c + kChannels]) +
-                           down * (left * below[c] + right * below[c + kChannels]);
-      target[c] = static_cast<uint8_t>((sum + (1u << 15)) >> 16);
-    }
-  }
+  for (size_t i = 0; i < taps_.size(); ++i, target += kChannels)
+    sample_color<kChannels>(source, pitch, taps_[i], target);
 }
 
 ImageU8 Undistorter::color(const ImageU8& distorted) const {
-  PHOTOSLAM_CHECK(distorted.width() == lens_width_ && distorted.height() == lens_height_, "{}x{}", distorted.width(),
-                  distorted.height());
+  check_fits(distorted);
   ImageU8 result(camera_.width, camera_.height, distorted.channels());
-  switch (distorted.channels()) {
-    case 1:
-      sample<1>(distorted, result);
-      break;
-    case 3:
-      sample<3>(distorted, result);
-      break;
-    default:
-      PHOTOSLAM_CHECK(false, "{} channels", distorted.channels());
-  }
+  distorted.channels() == 3 ? sample<3>(distorted, result) : sample<1>(distorted, result);
   return result;
 }
 
 ImageU16 Undistorter::depth(const ImageU16& distorted) const {
-  PHOTOSLAM_CHECK(distorted.width() == lens_width_ && distorted.height() == lens_height_ && distorted.channels() == 1,
-                  "{}x{}x{}", distorted.width(), distorted.height(), distorted.channels());
+  check_fits(distorted);
   ImageU16 result(camera_.width, camera_.height);
-  const auto mask = mask_.values();
-  const auto target = result.values();
-  for (size_t i = 0; i < taps_.size(); ++i) {
-    const Tap tap = taps_[i];
-    if (mask[i] != 0) target[i] = distorted(tap.x + (tap.fx >= 128 ? 1 : 0), tap.y + (tap.fy >= 128 ? 1 : 0));
-  }
+  const uint16_t* const source = distorted.values().data();
+  uint16_t* const target = result.values().data();
+  const auto pitch = static_cast<size_t>(lens_.width);
+  for (size_t i = 0; i < taps_.size(); ++i) target[i] = sample_depth(source, pitch, taps_[i]);
   return result;
 }
 

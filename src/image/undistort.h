@@ -3,11 +3,13 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "camera/distortion.h"
 #include "camera/pinhole.h"
 #include "image/image.h"
+#include "image/undistort_formulas.h"
 
 namespace photoslam {
 
@@ -22,10 +24,22 @@ class Undistorter {
   Undistorter(const PinholeCamera& lens, const Distortion& distortion, const PinholeCamera& result,
               const Quat& result_from_lens);
 
-  const PinholeCamera& camera() const { return camera_; }
+  const PinholeCamera& lens() const { return lens_; }      ///< Of the distorted images.
+  const PinholeCamera& camera() const { return camera_; }  ///< Of the results.
+  /// Where each pixel of a result comes from: [H, W].
+  std::span<const Tap> taps() const { return taps_; }
 
   /// 255 where the result has data, 0 where the lens did not see.
   const ImageU8& mask() const { return mask_; }
+
+  /// Throws unless an image has the lens's size, and one channel or, of 8 bits, three.
+  template <class T>
+  void check_fits(const Image<T>& distorted) const {
+    const int channels = distorted.channels();
+    PHOTOSLAM_CHECK(distorted.width() == lens_.width && distorted.height() == lens_.height &&
+                        (channels == 1 || (channels == 3 && sizeof(T) == 1)),
+                    "{}x{}x{}", distorted.width(), distorted.height(), channels);
+  }
 
   /// Bilinear; black where there is no data. The image has the lens's size and one or three channels.
   ImageU8 color(const ImageU8& distorted) const;
@@ -34,17 +48,10 @@ class Undistorter {
   ImageU16 depth(const ImageU16& distorted) const;
 
  private:
-  /// Position in the distorted image: the upper left of four neighbours and the way to the others in 1/256 pixel.
-  struct Tap {
-    uint16_t x = 0, y = 0;
-    uint16_t fx = 0, fy = 0;  // 0…256
-  };
-
   template <int kChannels>
   void sample(const ImageU8& distorted, ImageU8& result) const;
 
-  int lens_width_, lens_height_;
-  PinholeCamera camera_;
+  PinholeCamera lens_, camera_;
   ImageU8 mask_;
   std::vector<Tap> taps_;  // [H, W]
 };

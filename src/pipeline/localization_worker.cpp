@@ -23,7 +23,7 @@ LocalizationWorker::LocalizationWorker(const SystemOptions& options, const RunSe
                                        const SourceInfo& info)
     : settings_(settings),
       metres_per_depth_unit_(info.metres_per_depth_unit),
-      rectifier_(info),
+      rectifier_(info, settings.gpu.get()),
       builder_(options.features, options.depth, options.stereo, camera(), depth_sensor(info, rectifier_.baseline_m()),
                rectifier_.mask()),
       tracker_(options.localization, options.features, camera(), builder_.bf()) {}
@@ -52,9 +52,8 @@ FrameOutcome LocalizationWorker::process(FedFrame fed, const std::shared_ptr<con
 
   const Stopwatch wall;
   const double cpu_before = thread_cpu_seconds();
-  const ImageU8 color = rectifier_.color(std::move(frame.color));
-  ImageU16 depth = rectifier_.depth(std::move(frame.depth));
-  ImageU8 right = rectifier_.right(std::move(frame.right));
+  auto [color, depth, right] =
+      rectifier_.rectify({std::move(frame.color), std::move(frame.depth), std::move(frame.right)});
   if (!right.empty()) right = to_grey(right);
   const auto features = builder_.build(frame.id, frame.timestamp_ns, to_grey(color), depth, right);
   const bool may_become_keyframe = keyframes_allowed && !outcome.held_out && is_mapped(frame);

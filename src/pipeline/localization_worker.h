@@ -30,6 +30,9 @@ class LocalizationWorker {
   /// What mapping needs to know of the rectified camera.
   MapperSensor sensor() const;
 
+  /// Why frames are rectified on the CPU although there is a GPU; empty as long as all goes well.
+  std::string gpu_failure() const { return rectifier_.gpu_failure(); }
+
   /// Begins lost in a map of so many keyframes, with this next_free_place().
   void resume(int num_keyframes, int next_place) { tracker_.resume(num_keyframes, next_place); }
 

@@ -40,7 +40,7 @@ struct RunSettings {
   bool localize_only = false;                         ///< Track in the loaded map and leave it as it is.
   std::filesystem::path session_file;                 ///< Where the session goes at the end; empty: nowhere …
   double autosave_s = 0;                              ///< … and in between, this often; 0: never.
-  std::shared_ptr<splatting::Gpu> gpu;                ///< To splat on; null: the CPU.
+  std::shared_ptr<splatting::Gpu> gpu;                ///< To splat and undistort on; null: the CPU.
 };
 
 /// What became of one input frame.
@@ -75,6 +75,7 @@ struct RefinementPoint {
 struct GpuUse {
   double peak_mb = 0;
   double busy_seconds = 0;
+  std::string undistortion_failure = {};  ///< Why the CPU undistorted frames in the end; empty: all went well.
 };
 
 struct RunOutcome {

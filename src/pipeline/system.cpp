@@ -501,7 +501,10 @@ RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress)
   outcome_.loops_reconnected = loop_closer_.num_reconnected();
   outcome_.mapping_cpu_seconds = mapping_.cpu_seconds;
   outcome_.seconds_total = clock_.seconds();
-  if (settings_.gpu) outcome_.gpu = GpuUse{settings_.gpu->peak_mb(), settings_.gpu->busy_seconds() - busy_before};
+  if (settings_.gpu) {
+    outcome_.gpu =
+        GpuUse{settings_.gpu->peak_mb(), settings_.gpu->busy_seconds() - busy_before, localization_.gpu_failure()};
+  }
   outcome_.interrupted = outer_stop_.stop_requested();
   outcome_.failure = failures_.text();
   for (std::string& message : autosave_.take_failures()) outcome_.messages.push_back(std::move(message));

@@ -90,6 +90,38 @@ TEST(RunSlam, GoesOnWhenTheGpuIsLost) {
 }
 #endif
 
+#ifndef __SANITIZE_THREAD__
+/// A short walk of a stereo rig with lenses that distort, on a GPU that is lost after so many of its calls.
+RunOutcome run_with_gpu(int calls_until_lost) {
+  using splatting::cuda::HostDevice;
+  splatting::cuda::HostFaults faults;
+  faults.lost = [calls = 0, calls_until_lost]() mutable { return ++calls > calls_until_lost; };
+  RunSettings settings = deterministic(1);
+  settings.gpu = std::make_shared<splatting::Gpu>(
+      std::make_unique<splatting::cuda::Engine<HostDevice>>(HostDevice(splatting::cuda::ThreadOrder::forwards, &faults),
+                                                            uint64_t{1} << 30),
+      "host");
+  return run(CornerSource(4, 160, 120, SensorKind::stereo), settings);
+}
+
+TEST(RunSlam, TracksTheSameWhoeverUndistorts) {
+  const RunOutcome without = run(CornerSource(4, 160, 120, SensorKind::stereo), deterministic(1));
+  for (const int calls_until_lost : {1 << 30, 20, 1}) {
+    const RunOutcome outcome = run_with_gpu(calls_until_lost);
+    ASSERT_TRUE(outcome.gpu.has_value());
+    EXPECT_EQ(outcome.gpu->undistortion_failure.empty(), calls_until_lost == 1 << 30);
+    ASSERT_EQ(outcome.frames.size(), without.frames.size());
+    for (size_t i = 0; i < without.frames.size(); ++i) {
+      const FrameOutcome &got = outcome.frames[i], &want = without.frames[i];
+      ASSERT_TRUE(want.has_pose) << i << ": " << want.reason;
+      EXPECT_EQ(got.num_features, want.num_features) << i;
+      EXPECT_EQ(got.num_inliers, want.num_inliers) << i;
+      EXPECT_EQ(got.online_camera_from_world.translation, want.online_camera_from_world.translation) << i;
+    }
+  }
+}
+#endif
+
 TEST(RunSlam, TracksADistortedStereoRig) {
   const CornerSource source(40, 320, 240, SensorKind::stereo);
   const Quat rectified_from_left = FrameRectifier(source.info()).rectified_from_left();

@@ -277,6 +277,15 @@ bool Gpu::read_image(RenderResult& result) {
       [&] { state_->engine->read_image({result.rgb.data(), result.depth.data(), result.alpha.data()}); });
 }
 
+std::unique_ptr<GpuUndistorter> Gpu::make_undistorter(std::span<const cuda::DeviceLens> lenses) const {
+  try {
+    return std::make_unique<GpuUndistorter>(
+        state_->engine->make_undistorter(lenses.data(), static_cast<int>(lenses.size())));
+  } catch (const cuda::DeviceError& e) {
+    return std::make_unique<GpuUndistorter>(e.what());
+  }
+}
+
 Result<std::string> describe_gpu() {
   const auto module = load_module();
   if (!module) return module.error();

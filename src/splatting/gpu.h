@@ -10,6 +10,7 @@
 
 #include "base/result.h"
 #include "splatting/cuda/device_engine.h"
+#include "splatting/gpu_undistorter.h"
 #include "splatting/trainer.h"
 
 namespace photoslam::splatting {
@@ -44,6 +45,9 @@ class Gpu {
                 std::span<const float> dl_dalpha, Gradients& gradients);
   /// The image drawn last.
   bool read_image(RenderResult& result);
+
+  /// For the pictures of these lenses; its memory counts as this one's. May be called while another thread trains.
+  std::unique_ptr<GpuUndistorter> make_undistorter(std::span<const cuda::DeviceLens> lenses) const;
 
  private:
   struct State;

@@ -60,6 +60,9 @@ class FragileEngineOn final : public cuda::DeviceEngine {
     return live().step(view, target, loss, constants, update);
   }
   void forget_target(uint64_t id) override { engine_.forget_target(id); }
+  std::unique_ptr<cuda::DeviceUndistorter> make_undistorter(const cuda::DeviceLens* lenses, int count) override {
+    return live().make_undistorter(lenses, count);
+  }
   uint64_t peak_bytes() const override { return engine_.peak_bytes(); }
 
  private:

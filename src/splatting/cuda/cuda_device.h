@@ -6,6 +6,7 @@
 
 #include <cstring>
 #include <utility>
+#include <vector>
 
 #include "splatting/cuda/device_engine.h"
 #include "splatting/cuda/group.h"
@@ -20,19 +21,14 @@ inline void check_cuda(cudaError_t code, const char* what) {
 }
 
 /// One GPU through one stream of its own: everything happens in the order of the calls. Calls that hand data to the
-/// host wait for it; the others only queue.
+/// host wait for it; the others only queue. One thread uses it at a time; several of them, several threads.
 class CudaDevice {
  public:
   static constexpr size_t kSpareShare = 8;  ///< Arrays that grow take an eighth more.
 
-  CudaDevice() : CudaDevice(current_device()) {  // from here on the destructor cleans up after an exception
-    check_cuda(cudaDeviceGetAttribute(&num_units_, cudaDevAttrMultiProcessorCount, device_), "asking the GPU");
-    check_cuda(cudaDeviceGetAttribute(&has_pools_, cudaDevAttrMemoryPoolsSupported, device_), "asking the GPU");
-    check_cuda(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "making a stream");
-    probe_pools();
-    for (cudaEvent_t& event : marks_) check_cuda(cudaEventCreate(&event), "making an event");
-    check_cuda(cudaMallocHost(&staging_, kStagingSize), "allocating pinned memory");
-  }
+  CudaDevice() : CudaDevice(current_device(), kStagingSize, Priority::ordinary) {}
+  /// The same GPU, with so much pinned memory, where the thread blocks of kernels start before those of ordinary ones.
+  CudaDevice sibling(size_t staging_size) const { return {device_, staging_size, Priority::urgent}; }
   ~CudaDevice() {
     if (stream_ == nullptr) return;
     (void)cudaStreamSynchronize(stream_);
@@ -47,7 +43,8 @@ class CudaDevice {
         num_units_(other.num_units_),
         has_pools_(other.has_pools_),
         stream_(std::exchange(other.stream_, nullptr)),
-        staging_(std::exchange(other.staging_, nullptr)) {
+        staging_(std::exchange(other.staging_, nullptr)),
+        staging_size_(std::exchange(other.staging_size_, 0)) {
     for (int i = 0; i < kMarks; ++i) marks_[i] = std::exchange(other.marks_[i], nullptr);
   }
   CudaDevice& operator=(CudaDevice&&) = delete;
@@ -78,11 +75,9 @@ class CudaDevice {
   void upload(void* to, const void* from, size_t bytes) {
     if (bytes == 0) return;
     bind();
-    const bool fits = bytes <= kStagingSize - staged_;
-    if (fits) {
-      from = std::memcpy(staging_ + staged_, from, bytes);
-      staged_ += bytes;
-    }
+    char* const staged = stage(bytes);
+    const bool fits = staged != nullptr;
+    if (fits) from = std::memcpy(staged, from, bytes);
     check_cuda(cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, stream_), "writing to the GPU");
     if (!fits) wait();
   }
@@ -96,6 +91,18 @@ class CudaDevice {
     if (bytes == 0) return;
     bind();
     check_cuda(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, stream_), "reading from the GPU");
+    wait();
+  }
+  /// As download(), but it need not wait: `to` is complete after finish().
+  void download_later(void* to, const void* from, size_t bytes) {
+    char* const staged = stage(bytes);
+    if (staged == nullptr) return download(to, from, bytes);
+    bind();
+    check_cuda(cudaMemcpyAsync(staged, from, bytes, cudaMemcpyDeviceToHost, stream_), "reading from the GPU");
+    on_the_way_.push_back({to, staged, bytes});
+  }
+  void finish() {
+    bind();
     wait();
   }
   /// Rows of `width` bytes, `pitch` bytes apart, to rows without gaps.
@@ -131,8 +138,29 @@ class CudaDevice {
  private:
   static constexpr int kMarks = 8;
   static constexpr size_t kStagingSize = size_t{1} << 20;
+  enum class Priority { ordinary, urgent };
+  struct Download {
+    void* to;
+    const char* staged;
+    size_t bytes;
+  };
 
   explicit CudaDevice(int device) : device_(device) {}
+  CudaDevice(int device, size_t staging_size, Priority priority)
+      : CudaDevice(device) {  // from here on the destructor cleans up after an exception
+    bind();
+    check_cuda(cudaDeviceGetAttribute(&num_units_, cudaDevAttrMultiProcessorCount, device_), "asking the GPU");
+    check_cuda(cudaDeviceGetAttribute(&has_pools_, cudaDevAttrMemoryPoolsSupported, device_), "asking the GPU");
+    int least = 0, greatest = 0;
+    check_cuda(cudaDeviceGetStreamPriorityRange(&least, &greatest), "asking the GPU");
+    check_cuda(
+        cudaStreamCreateWithPriority(&stream_, cudaStreamNonBlocking, priority == Priority::urgent ? greatest : least),
+        "making a stream");
+    probe_pools();
+    for (cudaEvent_t& event : marks_) check_cuda(cudaEventCreate(&event), "making an event");
+    check_cuda(cudaMallocHost(&staging_, staging_size), "allocating pinned memory");
+    staging_size_ = staging_size;
+  }
   static int current_device() {
     int device = 0;
     check_cuda(cudaGetDevice(&device), "choosing a GPU");
@@ -150,14 +178,22 @@ class CudaDevice {
   void bind() const { check_cuda(cudaSetDevice(device_), "choosing a GPU"); }
   void wait() {
     check_cuda(cudaStreamSynchronize(stream_), "waiting for the GPU");
+    for (const Download& download : on_the_way_) std::memcpy(download.to, download.staged, download.bytes);
+    on_the_way_.clear();
     staged_ = 0;
+  }
+  /// Pinned memory until the next wait; null: there is not so much.
+  char* stage(size_t bytes) {
+    if (bytes > staging_size_ - staged_) return nullptr;
+    return staging_ + std::exchange(staged_, staged_ + bytes);
   }
 
   int device_ = 0, num_units_ = 0, has_pools_ = 0;
   cudaStream_t stream_ = nullptr;
   cudaEvent_t marks_[kMarks] = {};
-  char* staging_ = nullptr;  // pinned: data on its way to the GPU since the last wait
-  size_t staged_ = 0;
+  char* staging_ = nullptr;  // pinned: data on its way to the GPU and back since the last wait
+  size_t staging_size_ = 0, staged_ = 0;
+  std::vector<Download> on_the_way_;
 };
 
 }  // namespace photoslam::splatting::cuda

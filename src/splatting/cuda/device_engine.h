@@ -5,10 +5,12 @@
 // The engine on a GPU as the rest of the program sees it: the module photoslam_cuda.so makes one. Plain data crosses.
 
 #include <cstdint>
+#include <memory>
 #include <stdexcept>
 #include <string>
 
 #include "splatting/anchor_view.h"
+#include "splatting/cuda/device_undistorter.h"
 #include "splatting/density.h"
 #include "splatting/update_constants.h"
 
@@ -112,10 +114,13 @@ class DeviceEngine {
                        const UpdateConstants& constants, bool update) = 0;
   virtual void forget_target(uint64_t id) = 0;
 
+  /// Its memory counts against the engine's limit. May be made, used and destroyed while another thread trains.
+  virtual std::unique_ptr<DeviceUndistorter> make_undistorter(const DeviceLens* lenses, int count) = 0;
+
   virtual uint64_t peak_bytes() const = 0;
 };
 
-inline constexpr int kModuleVersion = 3;
+inline constexpr int kModuleVersion = 4;
 
 /// What the module exports as "photoslam_cuda_module".
 struct Module {

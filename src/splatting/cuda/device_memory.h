@@ -5,45 +5,86 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
+#include <mutex>
 #include <utility>
 
 #include "splatting/cuda/device_engine.h"
 
 namespace photoslam::splatting::cuda {
 
-/// Counts what is allocated on a device against a hard limit.
+/// A hard limit on what is allocated, by several threads together.
+class Budget {
+ public:
+  explicit Budget(uint64_t limit) : limit_(limit) {}
+
+  /// False: there is not so much left.
+  bool take(uint64_t bytes) {
+    const std::lock_guard lock(mutex_);
+    if (bytes > limit_ - used_) return false;
+    used_ += bytes;
+    return true;
+  }
+  void give_back(uint64_t bytes) {
+    const std::lock_guard lock(mutex_);
+    used_ -= bytes;
+  }
+  /// What was taken has been allocated.
+  void record_peak() {
+    const std::lock_guard lock(mutex_);
+    peak_ = used_ > peak_ ? used_ : peak_;
+  }
+  uint64_t limit() const { return limit_; }
+  uint64_t used() const {
+    const std::lock_guard lock(mutex_);
+    return used_;
+  }
+  uint64_t peak() const {
+    const std::lock_guard lock(mutex_);
+    return peak_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  const uint64_t limit_;
+  uint64_t used_ = 0, peak_ = 0;
+};
+
+/// Memory of a device, for one thread, within a budget.
 template <class Device>
 class Memory {
  public:
-  Memory(Device& device, uint64_t limit) : device_(device), limit_(limit) {}
+  Memory(Device& device, uint64_t limit) : Memory(device, std::make_shared<Budget>(limit)) {}
+  Memory(Device& device, std::shared_ptr<Budget> budget) : device_(device), budget_(std::move(budget)) {}
 
   /// Frees something that can be had again; false: there is nothing left to free.
   std::function<bool()> make_room = [] { return false; };
 
   void* allocate(size_t bytes) {
     while (true) {
-      if (used_ + bytes <= limit_) {
+      if (budget_->take(bytes)) {
         if (void* const data = device_.allocate(bytes)) {
-          used_ += bytes;
-          peak_ = used_ > peak_ ? used_ : peak_;
+          budget_->record_peak();
           return data;
         }
+        budget_->give_back(bytes);
       }
       if (make_room()) continue;
       throw DeviceError("out of GPU memory: " + std::to_string(bytes >> 20) + " MB wanted, " +
-                            std::to_string(used_ >> 20) + " MB in use, limit " + std::to_string(limit_ >> 20) + " MB",
+                            std::to_string(budget_->used() >> 20) + " MB in use, limit " +
+                            std::to_string(budget_->limit() >> 20) + " MB",
                         true);
     }
   }
   void release(void* data, size_t bytes) {
     device_.release(data);
-    used_ -= bytes;
+    budget_->give_back(bytes);
   }
-  uint64_t peak() const { return peak_; }
+  const std::shared_ptr<Budget>& budget() const { return budget_; }
 
  private:
   Device& device_;
-  uint64_t limit_, used_ = 0, peak_ = 0;
+  std::shared_ptr<Budget> budget_;
 };
 
 /// An array on the device that only grows; its contents are not initialised.

@@ -11,6 +11,7 @@
 #include "splatting/cuda/loss_kernels.h"
 #include "splatting/cuda/model_kernels.h"
 #include "splatting/cuda/target_cache.h"
+#include "splatting/cuda/undistorter.h"
 #include "splatting/cuda/update_kernel.h"
 
 namespace photoslam::splatting::cuda {
@@ -49,7 +50,12 @@ class Engine final : public DeviceEngine {
   Figures step(const DeviceView& view, const DeviceTarget& target, const DeviceLoss& loss,
                const UpdateConstants& constants, bool update) override;
   void forget_target(uint64_t id) override { targets_.forget(id); }
-  uint64_t peak_bytes() const override { return memory_.peak(); }
+  std::unique_ptr<DeviceUndistorter> make_undistorter(const DeviceLens* lenses, int count) override {
+    using Sibling = decltype(device_.sibling(0));
+    return std::make_unique<Undistorter<Sibling>>(device_.sibling(Undistorter<Sibling>::staging_bytes(lenses, count)),
+                                                  memory_.budget(), lenses, count);
+  }
+  uint64_t peak_bytes() const override { return memory_.budget()->peak(); }
 
  private:
   template <class T>

@@ -12,6 +12,8 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "splatting/cuda/device_engine.h"
 #include "splatting/cuda/host_execution.h"
@@ -59,6 +61,19 @@ class HostDevice {
     call();
     if (bytes > 0) std::memcpy(to, from, bytes);
   }
+  /// Another one with the same faults.
+  HostDevice sibling(size_t) const { return HostDevice(order_, faults_); }
+  /// What is there now, as a GPU does these things in order; `to` gets it by finish().
+  void download_later(void* to, const void* from, size_t bytes) {
+    call();
+    const char* const data = static_cast<const char*>(from);
+    on_the_way_.emplace_back(to, std::vector<char>(data, data + bytes));
+  }
+  void finish() {
+    call();
+    for (const auto& [to, data] : on_the_way_) std::memcpy(to, data.data(), data.size());
+    on_the_way_.clear();
+  }
   void copy(void* to, const void* from, size_t bytes) { upload(to, from, bytes); }
   void download(void* to, const void* from, size_t bytes) { upload(to, from, bytes); }
   /// Rows of `width` bytes, `pitch` bytes apart, to rows without gaps.
@@ -97,6 +112,7 @@ class HostDevice {
   ThreadOrder order_;
   HostFaults* faults_;
   std::chrono::steady_clock::time_point marks_[8];
+  std::vector<std::pair<void*, std::vector<char>>> on_the_way_;
   std::map<void*, size_t> mappings_;                   // sizes
   std::map<int, std::unique_ptr<HostBlock>> threads_;  // by their number
 };

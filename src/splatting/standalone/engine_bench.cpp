@@ -1,13 +1,16 @@
 // Copyright the photoslam authors.
 // SPDX-License-Identifier: Apache-2.0
 
-// Speed of the engine on this machine's GPU on a synthetic cloud: training steps and rendered frames, as JSON.
+// Speed of the engine on this machine's GPU on a synthetic cloud: training steps, rendered frames and undistorted
+// frames (color and depth; also by one core, and while another thread trains), as JSON.
 // Usage: engine_bench [WIDTH HEIGHT GAUSSIANS STEPS]
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <stop_token>
+#include <thread>
 
 #include "splatting/cuda/test_device.h"
 #include "splatting/testing/scenes.h"
@@ -72,6 +75,83 @@ struct Setup {
   }
 };
 
+/// A frame through a lens that bends as usual ones do, by about a tenth at the corners.
+class FrameBench {
+ public:
+  FrameBench(int width, int height)
+      : width_(width), pixels_(static_cast<size_t>(width) * static_cast<size_t>(height)), taps_(pixels_) {
+    const double cx = (width - 1) / 2.0, cy = (height - 1) / 2.0;
+    for (size_t i = 0; i < pixels_; ++i) {
+      const size_t column = i % static_cast<size_t>(width), row = i / static_cast<size_t>(width);
+      const double x = static_cast<double>(column) - cx, y = static_cast<double>(row) - cy;
+      const double scale = 1 - 0.1 * (x * x + y * y) / (cx * cx + cy * cy);
+      const double u = 256 * (scale * x + cx), v = 256 * (scale * y + cy);
+      taps_[i] = {static_cast<uint16_t>(u / 256), static_cast<uint16_t>(v / 256),
+                  static_cast<uint16_t>(static_cast<int>(u) % 256), static_cast<uint16_t>(static_cast<int>(v) % 256)};
+      for (size_t c = 0; c < 3; ++c) rgb_[3 * i + c] = static_cast<uint8_t>((3 * i + c) * 2654435761u >> 24);
+      depth_[i] = static_cast<uint16_t>(i * 2654435761u >> 16);
+    }
+  }
+  DeviceLens lens() const {
+    const int height = static_cast<int>(pixels_ / static_cast<size_t>(width_));
+    return {width_, height, taps_.data(), width_, height};
+  }
+  /// Milliseconds of frame after frame, ascending.
+  std::vector<double> on(DeviceUndistorter& undistorter, int frames) {
+    using Kind = DevicePicture::Kind;
+    const DevicePicture pictures[] = {{0, Kind::rgb, rgb_.data(), rgb_there_.data()},
+                                      {0, Kind::depth, depth_.data(), depth_there_.data()}};
+    return timed(frames, [&] { undistorter.undistort(pictures, 2); });
+  }
+  std::vector<double> on_host(int frames) {
+    const size_t pitch = static_cast<size_t>(width_);
+    return timed(frames, [&] {
+      for (size_t i = 0; i < pixels_; ++i) sample_color<3>(rgb_.data(), 3 * pitch, taps_[i], &rgb_here_[3 * i]);
+      for (size_t i = 0; i < pixels_; ++i) depth_here_[i] = sample_depth(depth_.data(), pitch, taps_[i]);
+    });
+  }
+  bool agrees() const { return rgb_here_ == rgb_there_ && depth_here_ == depth_there_; }
+
+ private:
+  template <class Work>
+  static std::vector<double> timed(int frames, const Work& work) {
+    std::vector<double> times;
+    for (int i = -5; i < frames; ++i) {
+      const auto start = std::chrono::steady_clock::now();
+      work();
+      if (i >= 0) times.push_back(milliseconds_since(start));
+    }
+    std::sort(times.begin(), times.end());
+    return times;
+  }
+
+  int width_;
+  size_t pixels_;
+  std::vector<Tap> taps_;
+  std::vector<uint8_t> rgb_ = std::vector<uint8_t>(3 * pixels_), rgb_here_ = rgb_, rgb_there_ = rgb_;
+  std::vector<uint16_t> depth_ = std::vector<uint16_t>(pixels_), depth_here_ = depth_, depth_there_ = depth_;
+};
+
+/// Figures of undistortion; `train` is one training step. False: host and device differ.
+template <class Train>
+bool bench_frames(DeviceEngine& engine, int width, int height, int frames, const Train& train) {
+  FrameBench bench(width, height);
+  const DeviceLens lens = bench.lens();
+  const auto undistorter = engine.make_undistorter(&lens, 1);
+  const std::vector<double> alone = bench.on(*undistorter, frames), host = bench.on_host(std::min(frames, 20));
+  std::vector<double> beside;
+  {
+    const std::jthread training([&](const std::stop_token& stop) {
+      while (!stop.stop_requested()) train();
+    });
+    beside = bench.on(*undistorter, frames);
+  }
+  std::printf(" \"undistort_ms\": %.3f, \"undistort_host_ms\": %.3f, \"undistort_while_training_ms\": %.3f,",
+              alone[alone.size() / 2], host[host.size() / 2], beside[beside.size() / 2]);
+  std::printf(" \"undistort_while_training_p99_ms\": %.3f,\n", beside[beside.size() * 99 / 100]);
+  return bench.agrees();
+}
+
 int run(int width, int height, int count, int steps) {
   const Scene scene = make_cloud(width, height, count);
   const Setup setup(scene);
@@ -93,12 +173,14 @@ int run(int width, int height, int count, int steps) {
   }
   std::printf("{\"size\": \"%dx%d\", \"gaussians\": %d, \"visible\": %u, \"instances\": %u, \"lost\": %u,\n", width,
               height, count, figures.visible, figures.instances, figures.lost);
+  const bool agrees = bench_frames(engine, width, height, steps,
+                                   [&] { engine.step(setup.view, setup.target, setup.loss, setup.constants, true); });
   std::printf(" \"step_ms\": %.3f, \"render_ms\": %.3f, \"peak_mb\": %.0f,\n \"stages_ms\": {", median(step_ms),
               median(render_ms), 1e-6 * static_cast<double>(engine.peak_bytes()));
   constexpr const char* kNames[6] = {"project", "sort", "forward", "loss", "backward", "update"};
   for (int s = 0; s < 6; ++s) std::printf("%s\"%s\": %.3f", s > 0 ? ", " : "", kNames[s], median(stages[s]));
   std::printf("}}\n");
-  return 0;
+  return agrees ? 0 : 1;
 }
 
 }  // namespace
