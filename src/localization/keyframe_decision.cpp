@@ -14,8 +14,9 @@ void KeyframeDecisionOptions::visit(OptionVisitor& v) {
   v.value({"min_tracked_ratio", "", 0.0, 1.0,
            "New keyframe when fewer landmarks are tracked, relative to the most since the last one."},
           min_tracked_ratio);
-  v.value({"max_rotation_deg", "deg", 1.0, 180.0, "New keyframe when the view turned this far."}, max_rotation_deg);
-  v.value({"max_translation", "", 0.01, 10.0, "New keyframe when the camera moved this share of the median depth."},
+  v.value({"max_rotation_deg", "deg", 1.0, 180.0, "New keyframe when the view turned this far, …"}, max_rotation_deg);
+  v.value({"max_translation", "", 0.01, 10.0,
+           "… or the camera moved this share of the median depth; of both together the shares add up."},
           max_translation);
 }
 
@@ -31,7 +32,7 @@ bool KeyframeDecision::should_insert(int64_t timestamp_ns, const SE3& camera_fro
   // A camera at rest sees nothing new, however long it stays.
   constexpr double kAtRest = 0.1;
   if (elapsed > options_.max_interval_s && std::max(turned, moved) > kAtRest) return true;
-  return turned > 1.0 || moved > 1.0 || num_tracked < options_.min_tracked_ratio * most_tracked_;
+  return turned + moved > 1.0 || num_tracked < options_.min_tracked_ratio * most_tracked_;
 }
 
 void KeyframeDecision::inserted(int64_t timestamp_ns, const SE3& camera_from_world) {

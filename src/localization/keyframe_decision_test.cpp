@@ -32,6 +32,15 @@ TEST_F(KeyframeDecisionTest, TranslationRotationAndLostLandmarksTrigger) {
   EXPECT_TRUE(decision.should_insert(now, SE3{}, static_cast<int>(300 * options.min_tracked_ratio) - 1, kDepth));
 }
 
+TEST_F(KeyframeDecisionTest, TurningAndMovingAddUp) {
+  const auto view = [&](double turned, double moved) {
+    return SE3(so3_exp(Vec3(0, turned * options.max_rotation_deg * M_PI / 180, 0)),
+               Vec3(0, moved * options.max_translation * kDepth, 0));
+  };
+  EXPECT_FALSE(decision.should_insert(kSecond / 2, view(0.45, 0.5), 300, kDepth));
+  EXPECT_TRUE(decision.should_insert(kSecond / 2, view(0.55, 0.5), 300, kDepth));
+}
+
 TEST_F(KeyframeDecisionTest, KeepsTheShortestInterval) {
   const SE3 far(Quat::Identity(), Vec3(1, 0, 0));
   EXPECT_FALSE(decision.should_insert(static_cast<int64_t>(0.9 * options.min_interval_s * kSecond), far, 10, kDepth));
