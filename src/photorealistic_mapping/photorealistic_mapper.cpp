@@ -135,7 +135,8 @@ void PhotorealisticMapper::update_poses(const MapSnapshot& map) {
 }
 
 /// What would grow with every lap: pictures of places that newer keyframes show as well, and blocks of few gaussians.
-/// The next keyframe may still need the picture of the newest one.
+/// The next keyframe may still need the picture of the newest one. In a newer map the parent may be one that has not
+/// come yet: then its child keeps its gaussians until it has.
 void PhotorealisticMapper::release_culled(const MapSnapshot& map) {
   std::vector<Adoption> adoptions;
   for (size_t i = 0; i + 1 < views_.size(); ++i) {
@@ -143,7 +144,7 @@ void PhotorealisticMapper::release_culled(const MapSnapshot& map) {
     if (!keyframe.culled) continue;
     if (views_[i].has_images()) retire(i);
     const auto child = static_cast<int>(i), parent = keyframe.parent.value;
-    if (model_.size(child) == 0) continue;
+    if (model_.size(child) == 0 || keyframe.parent.value >= std::ssize(anchors_from_world_)) continue;
     const SE3& parent_from_world = anchors_from_world_[static_cast<size_t>(parent)];
     adoptions.push_back({child, parent, parent_from_world * anchors_from_world_[i].inverse()});
   }

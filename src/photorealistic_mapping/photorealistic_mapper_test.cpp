@@ -435,6 +435,30 @@ TEST_F(PhotorealisticMapperTest, AKeyframeWithoutPicturesIsAnAnchor) {
   }
 }
 
+TEST_F(PhotorealisticMapperTest, ACulledKeyframeKeepsItsGaussiansUntilItsParentHasCome) {
+  PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
+  add(mapper, at(0), stereo(at(0)));
+  for (const double x : {0.3, 0.6}) world_.add(at(x));
+  MapSnapshot map = *world_.snapshot();
+  auto culled = std::make_shared<KeyframeView>(map.keyframe(KeyframeId(0)));
+  culled->keyframe.culled = true;
+  culled->keyframe.parent = KeyframeId(2);  // the spanning tree was turned
+  map.keyframes[0] = culled;
+  const auto of_first = [&] {
+    size_t count = 0;
+    mapper.gaussians().for_each([&](size_t i) { count += mapper.gaussians().anchor(i) == 0; });
+    return count;
+  };
+  const size_t before = of_first();
+  ASSERT_GT(before, 0u);
+  mapper.add_keyframe(map, KeyframeId(1), {}, executor_);
+  mapper.update_poses(map);
+  EXPECT_EQ(of_first(), before);
+  mapper.add_keyframe(map, KeyframeId(2), {}, executor_);
+  EXPECT_EQ(of_first(), 0u);
+  EXPECT_EQ(mapper.gaussians().size(), before);
+}
+
 TEST_F(PhotorealisticMapperTest, AKeyframeThatCameTooLateIsAnAnchor) {
   PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
   for (const double x : {0.0, 0.3, 0.6}) world_.add(at(x));
