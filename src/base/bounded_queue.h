@@ -28,17 +28,15 @@ class BoundedQueue {
 
   /// False when the queue is closed; the value is then dropped.
   bool push(T value) {
-    return push(std::move(value), [](const T&, const T&) { return false; });
+    return push(std::move(value), [](const T&, std::deque<T>&) {});
   }
 
-  /// The same, but that the value takes the place of the newest element that waits if `replaces(value, newest)`.
-  template <class Replaces>
-  bool push(T value, const Replaces& replaces) {
+  /// The same, but that first `make_way(value, waiting)` may change or remove what waits, oldest first. Everybody else
+  /// is kept from the queue meanwhile.
+  template <class MakeWay>
+  bool push(T value, const MakeWay& make_way) {
     std::unique_lock lock(mutex_);
-    if (!closed_ && !items_.empty() && replaces(std::as_const(value), std::as_const(items_.back()))) {
-      items_.back() = std::move(value);
-      return true;
-    }
+    if (!closed_) make_way(std::as_const(value), items_);
     if (overflow_ == Overflow::block) has_room_.wait(lock, [&] { return closed_ || items_.size() < capacity_; });
     if (closed_) return false;
     if (overflow_ == Overflow::drop_oldest && items_.size() >= capacity_) {

@@ -38,13 +38,15 @@ TEST(BoundedQueue, GrowLosesNothingAndWaitsForNobody) {
   for (int i = 0; i < 100; ++i) ASSERT_EQ(queue.pop(), i);
 }
 
-TEST(BoundedQueue, AValueTakesThePlaceOfTheNewestOneIfItIsToldTo) {
+TEST(BoundedQueue, WhatWaitsMayMakeWay) {
   BoundedQueue<int> queue(2, Overflow::block);
-  const auto same_tens = [](int value, int newest) { return value / 10 == newest / 10; };
+  const auto same_tens = [](int value, std::deque<int>& waiting) {
+    if (!waiting.empty() && value / 10 == waiting.back() / 10) waiting.pop_back();
+  };
   for (const int value : {11, 12, 21, 22, 23}) EXPECT_TRUE(queue.push(value, same_tens)) << "a full queue has room";
   EXPECT_EQ(queue.pop(), 12);
   EXPECT_EQ(queue.pop(), 23);
-  EXPECT_TRUE(queue.push(24, same_tens)) << "there is none to replace";
+  EXPECT_TRUE(queue.push(24, same_tens)) << "there is nothing to remove";
   queue.close();
   EXPECT_FALSE(queue.push(25, same_tens));
   EXPECT_EQ(queue.pop(), 24);

@@ -48,7 +48,8 @@ void visit_keys(Visitor& v, AnyReport& r) {
   v.group("mapping", [&](auto& g) {
     auto& m = r.mapping;
     g("iterations", m.iterations), g("ms_per_iteration", m.ms_per_iteration), g("gaussians", m.gaussians);
-    g("keyframes", m.keyframes), g("cpu_seconds", m.cpu_seconds), g("seconds_online", m.seconds_online);
+    g("keyframes", m.keyframes), g("keyframes_without_pictures", m.keyframes_without_pictures);
+    g("cpu_seconds", m.cpu_seconds), g("seconds_online", m.seconds_online);
     g("seconds_drain", m.seconds_drain), g("seconds_refine", m.seconds_refine);
   });
   v("seconds_total", r.seconds_total);

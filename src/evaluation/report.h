@@ -35,6 +35,7 @@ struct Report {
     Count iterations;
     Figure ms_per_iteration;
     Count gaussians, keyframes;
+    Count keyframes_without_pictures;  ///< Photorealistic mapping was too slow for them.
     Figure cpu_seconds, seconds_online, seconds_drain, seconds_refine;
   };
   struct Ate {

@@ -66,6 +66,7 @@ void add_mapping_figures(const RunOutcome& run, Report& report) {
   report.mapping.iterations = run.iterations;
   report.mapping.gaussians = static_cast<int64_t>(run.final.gaussians.size());
   report.mapping.keyframes = static_cast<int64_t>(run.final.keyframes_from_world.size());
+  report.mapping.keyframes_without_pictures = run.keyframes_without_pictures;
   report.mapping.cpu_seconds = run.mapping_cpu_seconds;
   report.mapping.seconds_online = run.seconds_online;
   report.mapping.seconds_drain = run.seconds_drain;

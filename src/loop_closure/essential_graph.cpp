@@ -67,6 +67,7 @@ MapCorrection close_loop(const PoseGraphOptions& options, int min_shared, bool w
   PoseGraph graph = essential_graph(map, min_shared);
   const std::vector<Sim3> before = graph.pose_from_world;
   MapCorrection correction = recognize_landmarks(map, loop);
+  correction.adjustment_is_due = true;
   if (map.root_of(loop.then) != map.root_of(loop.now)) {
     correction.joints.push_back(join_maps(map, loop, graph));
   }

@@ -11,7 +11,8 @@ namespace photoslam {
 
 /// Closes a loop: spreads the gap between where `now` is and where the loop says it should be over the essential graph
 /// (spanning tree, pairs of keyframes sharing at least `min_shared` landmarks, the loop). Pairs weigh as much as they
-/// share landmarks: most of the gap has come about where the map hangs by a thread. Keyframes without parent stay.
+/// share landmarks: most of the gap has come about where the map hangs by a thread. Keyframes without parent stay. The
+/// adjustment of everything is due then.
 MapCorrection close_loop(const PoseGraphOptions& options, int min_shared, bool with_scale, const MapSnapshot& map,
                          const Loop& loop);
 

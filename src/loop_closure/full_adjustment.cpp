@@ -69,8 +69,8 @@ class RobustAdjustment {
   RobustAdjustment(const BundleOptions& options, const PinholeCamera& camera, double bf)
       : options_(options), camera_(camera), bf_(bf) {}
 
-  /// The observations of the problem stay as they are.
-  void solve(BundleProblem& problem, const std::function<bool()>& interrupted) {
+  /// The observations of the problem stay as they are. False: interrupted.
+  bool solve(BundleProblem& problem, const std::function<bool()>& interrupted) {
     struct Round {
       int iterations;
       double gate;  // in thresholds of the robust loss
@@ -81,11 +81,12 @@ class RobustAdjustment {
       some.max_iterations = std::min(iterations, options_.max_iterations);
       const bool stopped = adjuster_.solve(some, camera_, bf_, problem, interrupted).interrupted;
       problem.observations = all;
-      if (stopped) return;
+      if (stopped) return false;
       std::erase_if(problem.observations, [&](const auto& o) { return !fits(problem, o, gate); });
     }
-    adjuster_.solve(options_, camera_, bf_, problem, interrupted);
+    const bool stopped = adjuster_.solve(options_, camera_, bf_, problem, interrupted).interrupted;
     problem.observations = all;
+    return !stopped;
   }
 
   bool fits(const BundleProblem& problem, const BundleProblem::Observation& o, double gate) const {
@@ -109,9 +110,8 @@ MapCorrection adjust_everything(const BundleOptions& options, const PinholeCamer
   Problem problem(map, depth_is_measured);
   const BundleProblem before = problem.bundle;
   RobustAdjustment adjustment(options, camera, bf);
-  adjustment.solve(problem.bundle, interrupted);
-
   MapCorrection correction;
+  if (adjustment.solve(problem.bundle, interrupted)) correction.adjustment_is_due = false;
   for (const auto& o : problem.bundle.observations) {
     if (adjustment.fits(problem.bundle, o, 1.0)) continue;
     correction.wrong_observations.emplace_back(problem.landmark_of_point[static_cast<size_t>(o.point)],

@@ -24,8 +24,8 @@ LoopCloser::LoopCloser(const LoopClosureOptions& options, const OrbOptions& orb,
 std::optional<MapCorrection> LoopCloser::process(const MapSnapshot& map, const std::function<bool()>& interrupted) {
   if (!options_.enabled || map.num_corrections < num_issued_) return std::nullopt;
   num_issued_ = map.num_corrections;
-  if (must_adjust_) {
-    must_adjust_ = false;
+  num_settled_ = next_.value;
+  if (map.adjustment_is_due) {
     ++num_issued_;
     return adjust_everything(options_.bundle, camera_, bf_, map, interrupted);
   }
@@ -34,20 +34,23 @@ std::optional<MapCorrection> LoopCloser::process(const MapSnapshot& map, const s
     ++next_.value;
     count_reconnection(map, now);
     std::optional<Loop> loop = detector_.detect(map, now);
-    if (!loop) continue;
+    if (!loop) {
+      num_settled_ = next_.value;
+      continue;
+    }
     ++num_issued_;
     if (loop->is_met) return recognize_landmarks(map, *loop);
     ++num_closed_;
-    must_adjust_ = true;
     loops_.push_back(*loop);
     return close_loop(options_.pose_graph, options_.essential_landmarks, bf_ <= 0, map, *loop);
   }
   return std::nullopt;
 }
 
-void LoopCloser::resume(const MapSnapshot& map) {
-  for (; map.has(next_); ++next_.value) detector_.add(map, next_);
+void LoopCloser::resume(const MapSnapshot& map, int num_settled) {
+  for (; map.has(next_) && next_.value < num_settled; ++next_.value) detector_.add(map, next_);
   num_issued_ = map.num_corrections;
+  num_settled_ = next_.value;
 }
 
 /// The covisible keyframes of one that stays around are the last few; others in between, unless they were culled, mean

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -29,14 +30,16 @@ class LoopCloser {
   /// bf = fx * baseline [px m], 0 where depth is not measured: then loops correct the scale too.
   LoopCloser(const LoopClosureOptions& options, const OrbOptions& orb, const PinholeCamera& camera, double bf);
 
-  /// Looks at keyframes it has not seen yet, until one closes a loop; after a loop that the map has taken over adjusts
-  /// everything once. The caller applies the correction and calls again with the corrected map, until nothing comes.
+  /// Looks at keyframes it has not seen yet, until one closes a loop; when the map has taken over a loop, adjusts
+  /// everything. The caller applies the correction and calls again with the corrected map, until nothing comes.
   /// Nothing comes either while an earlier correction is not in the map yet.
   std::optional<MapCorrection> process(const MapSnapshot& map, const std::function<bool()>& interrupted = {});
 
-  /// Begins with a map made before, whose keyframes have all been looked at.
-  void resume(const MapSnapshot& map);
+  /// Begins with a map made before. The first `num_settled` of its keyframes are not looked at again.
+  void resume(const MapSnapshot& map, int num_settled);
 
+  /// Keyframes that have been looked at, and whatever came of them is in the map. From any thread.
+  int num_settled() const { return num_settled_; }
   int num_closed() const { return num_closed_; }
   /// Times that tracking itself found back to an old part of the map.
   int num_reconnected() const { return num_reconnected_; }
@@ -50,8 +53,8 @@ class LoopCloser {
   double bf_;
   LoopDetector detector_;
   KeyframeId next_{0};
+  std::atomic<int> num_settled_{0};
   int num_issued_ = 0;  // corrections
-  bool must_adjust_ = false;
   int num_closed_ = 0;
   int num_reconnected_ = 0;
   bool in_old_place_ = false;

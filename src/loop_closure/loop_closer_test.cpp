@@ -6,6 +6,7 @@
 
 #include <set>
 
+#include "base/archive.h"
 #include "geometry_mapping/geometry_mapper.h"
 #include "loop_closure/full_adjustment.h"
 #include "map/testing/corridor_world.h"
@@ -156,6 +157,49 @@ TEST(LoopCloser, CulledKeyframesAreNoWayAround) {
     closer.process(*map.snapshot());
     EXPECT_EQ(closer.num_reconnected(), with_gap ? 1 : 0);
   }
+}
+
+/// As a session keeps it.
+std::string saved(GeometryMapper& geometry) {
+  Archive archive;
+  archive(geometry);
+  return archive.bytes();
+}
+
+TEST(LoopCloser, GoesOnInASessionWhereItWas) {
+  const CorridorWorld corridor = CorridorWorld::square(10, 3);
+  Closing whole(corridor, true, 0, 3);
+  whole.run();
+  const std::string expected = saved(whole.geometry);
+  // Saved after so many corrections; the next one was on its way, and is lost.
+  for (int num_applied = 0; num_applied < whole.geometry.snapshot()->num_corrections; ++num_applied) {
+    Closing first(corridor, true, 0, 3);
+    auto map = first.geometry.snapshot();
+    for (int i = 0; i < num_applied; ++i) map = first.geometry.correct(first.closer.process(*map).value());
+    EXPECT_EQ(map->adjustment_is_due, num_applied == 1) << "the loop is closed, and no more";
+    ASSERT_TRUE(first.closer.process(*map).has_value());
+    EXPECT_LT(first.closer.num_settled(), static_cast<int>(map->keyframes.size()));
+    const std::string session = saved(first.geometry);
+
+    Closing second(corridor, true, 0, 3);
+    Archive reader(session);
+    reader(second.geometry);
+    second.closer.resume(*second.geometry.snapshot(), first.closer.num_settled());
+    second.run();
+    EXPECT_TRUE(saved(second.geometry) == expected) << num_applied;
+    EXPECT_EQ(second.closer.num_settled(), static_cast<int>(corridor.truth.size()));
+  }
+}
+
+TEST(LoopCloser, AnInterruptedAdjustmentStaysDue) {
+  Closing closing(CorridorWorld::square(10, 3), true, 0, 3);
+  auto map = closing.geometry.correct(closing.closer.process(*closing.geometry.snapshot()).value());
+  ASSERT_TRUE(map->adjustment_is_due);
+  map = closing.geometry.correct(closing.closer.process(*map, [] { return true; }).value());
+  EXPECT_TRUE(map->adjustment_is_due);
+  map = closing.geometry.correct(closing.closer.process(*map).value());
+  EXPECT_FALSE(map->adjustment_is_due);
+  EXPECT_LT(closing.ate(), 0.005 * closing.corridor.path_length());
 }
 
 TEST(FullAdjustment, LandmarksTakenForOneAnotherLeaveTheMap) {

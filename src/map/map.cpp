@@ -206,6 +206,7 @@ void Map::cull_keyframe(KeyframeId id) {
 
 void Map::apply(const MapCorrection& correction) {
   ++num_corrections_;
+  adjustment_is_due_ = correction.adjustment_is_due.value_or(adjustment_is_due_);
   if (correction.new_world_from_old_world.empty()) return;
   std::vector<Sim3> moves;  // [K] new_world_from_old_world
   for (const Keyframe& keyframe : keyframes_) {
@@ -259,6 +260,7 @@ void Map::join(KeyframeId child, KeyframeId parent) {
 }
 
 void Map::append(const Map& other) {
+  adjustment_is_due_ |= other.adjustment_is_due_;
   const auto num_keyframes = static_cast<int32_t>(keyframes_.size());
   const auto num_landmarks = static_cast<int32_t>(landmarks_.size());
   const auto count_on = [&](auto& id) {
@@ -310,6 +312,7 @@ std::shared_ptr<const MapSnapshot> Map::snapshot() {
   auto next = published_ ? std::make_shared<MapSnapshot>(*published_) : std::make_shared<MapSnapshot>();
   ++next->version;
   next->num_corrections = num_corrections_;
+  next->adjustment_is_due = adjustment_is_due_;
   next->keyframes.resize(keyframes_.size());
   for (const KeyframeId id : changed_keyframes_) {
     const Keyframe& current = keyframe(id);

@@ -96,6 +96,7 @@ class Map {
   std::set<KeyframeId> changed_keyframes_;                 // since the last snapshot
   std::set<int> changed_chunks_;
   int num_corrections_ = 0;
+  bool adjustment_is_due_ = false;
   std::shared_ptr<const MapSnapshot> published_;
 };
 

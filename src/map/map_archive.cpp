@@ -22,7 +22,7 @@ void serialize(Archive& a, FeatureFrame& f) {
 }
 
 void Map::serialize(Archive& a, int image_width, int image_height) {
-  a(scale_factor_, num_levels_, num_corrections_);
+  a(scale_factor_, num_levels_, num_corrections_, adjustment_is_due_);
   keyframes_.resize(a.count(keyframes_.size()));
   for (size_t i = 0; i < keyframes_.size(); ++i) {
     Keyframe& k = keyframes_[i];

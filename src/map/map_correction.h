@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -19,6 +20,8 @@ struct MapCorrection {
   /// Moves in addition to that of the oldest observer [m, new world].
   std::map<LandmarkId, Vec3> landmark_shifts = {};
 
+  /// Whether everything is to be adjusted after this, or has been by this. Nothing: what was due stays due.
+  std::optional<bool> adjustment_is_due = {};
   /// Maps of their own until now: that of the first keyframe hangs by it on the second.
   std::vector<std::pair<KeyframeId, KeyframeId>> joints = {};
   /// Landmarks that are the same point: the first is to become the second.

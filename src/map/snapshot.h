@@ -29,6 +29,7 @@ class MapSnapshot {
  public:
   uint64_t version = 0;
   int num_corrections = 0;                                            ///< MapCorrections that have been applied.
+  bool adjustment_is_due = false;                                     ///< Of everything, since a loop was closed.
   std::vector<std::shared_ptr<const KeyframeView>> keyframes;         ///< [K] by KeyframeId.
   std::vector<std::shared_ptr<const LandmarkChunk>> landmark_chunks;  ///< By LandmarkId / LandmarkChunk::kSize.
   int num_landmarks = 0;                                              ///< Ids given out, dead ones included.

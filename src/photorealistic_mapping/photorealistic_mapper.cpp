@@ -135,7 +135,8 @@ void PhotorealisticMapper::update_poses(const MapSnapshot& map) {
 }
 
 /// What would grow with every lap: pictures of places that newer keyframes show as well, and blocks of few gaussians.
-/// The next keyframe may still need the picture of the newest one.
+/// The next keyframe may still need the picture of the newest one. In a newer map the parent may be one that has not
+/// come yet: then its child keeps its gaussians until it has.
 void PhotorealisticMapper::release_culled(const MapSnapshot& map) {
   std::vector<Adoption> adoptions;
   for (size_t i = 0; i + 1 < views_.size(); ++i) {
@@ -143,7 +144,7 @@ void PhotorealisticMapper::release_culled(const MapSnapshot& map) {
     if (!keyframe.culled) continue;
     if (views_[i].has_images()) retire(i);
     const auto child = static_cast<int>(i), parent = keyframe.parent.value;
-    if (model_.size(child) == 0) continue;
+    if (model_.size(child) == 0 || keyframe.parent.value >= std::ssize(anchors_from_world_)) continue;
     const SE3& parent_from_world = anchors_from_world_[static_cast<size_t>(parent)];
     adoptions.push_back({child, parent, parent_from_world * anchors_from_world_[i].inverse()});
   }
@@ -183,20 +184,38 @@ void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, c
   update_poses(map);
 
   TrainingView& newest = views_.emplace_back();
-  set_images(images.color, images.depth, images.mask.empty() ? sensor_.mask : images.mask, newest);
   newest.exposure_is_known = options_.exposure.enabled && exposure;
   if (newest.exposure_is_known) {
     newest.exposure.start_from(*exposure);
   } else if (views_.size() > 1) {
     newest.exposure.start_from(views_[views_.size() - 2].exposure.exposure());
   }
-  if (!images.right.empty()) newest.right = shrink_color(images.right, kSeedingFactor);
+  if (images.color.empty() || keyframe.culled) {
+    schedule_.retire(id.value);
+  } else {
+    add_pictures(map, images, executor);
+  }
+}
+
+/// Of the newest keyframe.
+void PhotorealisticMapper::add_pictures(const MapSnapshot& map, const KeyframeImages& images, Executor& executor) {
   const size_t index = views_.size() - 1;
+  set_images(images.color, images.depth, images.mask.empty() ? sensor_.mask : images.mask, views_[index]);
+  if (!images.right.empty()) views_[index].right = shrink_color(images.right, kSeedingFactor);
   // A single camera's first keyframe has none before it to compare with: it gets its depth from the second.
-  if (index > 0 && views_[index - 1].lacks_depth) seed_keyframe(map, index - 1, executor);
+  const auto active = schedule_.active();
+  if (active.size() > 1) {
+    const auto before = static_cast<size_t>(active[active.size() - 2]);
+    if (views_[before].lacks_depth) seed_keyframe(map, before, executor);
+  }
   seed_keyframe(map, index, executor);
   prune(options_.densification, scene_depth_, model_);
   keep_image_budget();
+}
+
+std::optional<size_t> PhotorealisticMapper::newest_with_pictures() const {
+  const auto active = schedule_.active();
+  return active.empty() ? std::nullopt : std::optional(static_cast<size_t>(active.back()));
 }
 
 /// Of its pictures, with all levels that training may ask for.
@@ -222,7 +241,9 @@ void PhotorealisticMapper::retire(size_t view) {
 
 /// The newest keyframe's pictures stay: the next one's depth may need them.
 void PhotorealisticMapper::keep_image_budget() {
-  const double fitting = options_.image_budget_mb / std::max(megabytes(views_.back()), 1e-6);
+  const auto newest = newest_with_pictures();
+  if (!newest) return;
+  const double fitting = options_.image_budget_mb / std::max(megabytes(views_[*newest]), 1e-6);
   while (static_cast<double>(schedule_.active().size()) > std::max(fitting, 2.0)) {
     std::vector<SE3> poses;
     for (const int view : schedule_.active()) poses.push_back(view_from_world(static_cast<size_t>(view)));
@@ -358,7 +379,7 @@ void PhotorealisticMapper::append(PhotorealisticMapper other) {
   model_.append(other.model_);
   schedule_.append(other.schedule_);
   keep_gaussian_budget();
-  if (has_keyframes()) keep_image_budget();
+  keep_image_budget();
 }
 
 splatting::TrainOptions PhotorealisticMapper::train_options(std::optional<double> progress, int factor) const {
@@ -432,7 +453,7 @@ KeyframeComparison PhotorealisticMapper::compare(size_t keyframe, Executor& exec
   PHOTOSLAM_CHECK(keyframe < views_.size(), "keyframe {} of {}", keyframe, views_.size());
   render_picture(keyframe, executor);
   apply(views_[keyframe].exposure.exposure(), render_);
-  const bool newest = keyframe + 1 == views_.size();
+  const bool newest = keyframe == newest_with_pictures();
   return {to_rgb(views_[keyframe].picture.color), to_u8(to_image(render_)),
           newest ? newest_features_ : std::vector<DepthPixel>()};
 }

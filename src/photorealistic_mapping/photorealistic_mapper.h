@@ -99,7 +99,8 @@ class PhotorealisticMapper {
   void update_poses(const MapSnapshot& map);
 
   /// Starts training on the next keyframe (by id) and seeds the part of its image that the map does not explain. An
-  /// exposure learnt before is taken over; without one it is found by comparing the image with the map.
+  /// exposure learnt before is taken over; without one it is found by comparing the image with the map. Without
+  /// pictures, or culled already, it is only an anchor; the map may be newer than the keyframe.
   void add_keyframe(const MapSnapshot& map, KeyframeId id, const KeyframeImages& images, Executor& executor,
                     const std::optional<splatting::Exposure>& exposure = {});
 
@@ -113,8 +114,8 @@ class PhotorealisticMapper {
   /// Removes what exceeds max_gaussians, as after loading a map that was made with a larger budget. Returns how many.
   size_t keep_gaussian_budget();
 
-  /// One training iteration, Eq. (4). At least one keyframe is needed. `progress` in [0, 1] says how much of the
-  /// refinement is done; empty while frames arrive.
+  /// One training iteration, Eq. (4). At least one keyframe with pictures is needed. `progress` in [0, 1] says how much
+  /// of the refinement is done; empty while frames arrive.
   splatting::StepResult train(std::optional<double> progress, Executor& executor);
 
   /// Of a keyframe that still has its picture.
@@ -124,6 +125,8 @@ class PhotorealisticMapper {
   bool has_seams() const { return schedule_.is_revisiting(); }
   size_t num_keyframes() const { return views_.size(); }
   bool has_keyframes() const { return !views_.empty(); }
+  /// The newest keyframe that still has its pictures; none: there is nothing to train on.
+  std::optional<size_t> newest_with_pictures() const;
   const splatting::GaussianModel& gaussians() const { return model_; }
   int num_iterations() const { return iteration_; }
   /// Running mean of the PSNR of the training views, as rendered [dB]; 0 before the first iteration.
@@ -155,6 +158,7 @@ class PhotorealisticMapper {
   SE3 view_from_world(size_t view) const;
   splatting::RenderOptions render_options(int factor) const;
   splatting::TrainOptions train_options(std::optional<double> progress, int factor) const;
+  void add_pictures(const MapSnapshot& map, const KeyframeImages& images, Executor& executor);
   void set_images(const ImageU8& color, const ImageU16& depth, const ImageU8& mask, TrainingView& view) const;
   double megabytes(const TrainingView& view) const;
   void retire(size_t view);

@@ -402,5 +402,80 @@ TEST_F(PhotorealisticMapperTest, ForgetsPicturesBeyondTheBudgetAndGoesOn) {
   }
 }
 
+TEST_F(PhotorealisticMapperTest, AKeyframeWithoutPicturesIsAnAnchor) {
+  PhotorealisticMapper mapper({}, {.camera = kCamera}, 1);
+  const auto add_anchor = [&](double x) {
+    world_.add(at(x));
+    mapper.add_keyframe(*world_.snapshot(), KeyframeId(count_++), {}, executor_);
+  };
+  add_anchor(-0.3);
+  EXPECT_FALSE(mapper.newest_with_pictures().has_value()) << "nothing to train on yet";
+  add(mapper, at(0), {});
+  add_anchor(0.1);
+  EXPECT_EQ(mapper.newest_with_pictures(), 1u);
+  EXPECT_LT(mapper.gaussians().size(), 200u);
+  add(mapper, at(0.3, 0.05), {});
+  EXPECT_GT(mapper.gaussians().size(), 800u) << "what the second picture is wanted for may come later";
+  EXPECT_GT(share_on_the_wall(mapper, 0.08), 0.9);
+  add_anchor(0.4);
+  const double before = mapper.train({}, executor_).mse;
+  double after = before;
+  for (int i = 0; i < 40; ++i) after = mapper.train({}, executor_).mse;
+  EXPECT_LT(after, before);
+  EXPECT_EQ(mapper.freeze().keyframes_from_world.size(), 5u);
+  EXPECT_EQ(mapper.compare(3, executor_).features.empty(), false) << "the newest picture's";
+
+  Archive saved;
+  mapper.serialize(saved);
+  PhotorealisticMapper loaded({}, {.camera = kCamera}, 99);
+  Archive reader(saved.bytes());
+  loaded.serialize(reader);
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_EQ(mapper.train({}, executor_).loss, loaded.train({}, executor_).loss) << i;
+  }
+}
+
+TEST_F(PhotorealisticMapperTest, ACulledKeyframeKeepsItsGaussiansUntilItsParentHasCome) {
+  PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
+  add(mapper, at(0), stereo(at(0)));
+  for (const double x : {0.3, 0.6}) world_.add(at(x));
+  MapSnapshot map = *world_.snapshot();
+  auto culled = std::make_shared<KeyframeView>(map.keyframe(KeyframeId(0)));
+  culled->keyframe.culled = true;
+  culled->keyframe.parent = KeyframeId(2);  // the spanning tree was turned
+  map.keyframes[0] = culled;
+  const auto of_first = [&] {
+    size_t count = 0;
+    mapper.gaussians().for_each([&](size_t i) { count += mapper.gaussians().anchor(i) == 0; });
+    return count;
+  };
+  const size_t before = of_first();
+  ASSERT_GT(before, 0u);
+  mapper.add_keyframe(map, KeyframeId(1), {}, executor_);
+  mapper.update_poses(map);
+  EXPECT_EQ(of_first(), before);
+  mapper.add_keyframe(map, KeyframeId(2), {}, executor_);
+  EXPECT_EQ(of_first(), 0u);
+  EXPECT_EQ(mapper.gaussians().size(), before);
+}
+
+TEST_F(PhotorealisticMapperTest, AKeyframeThatCameTooLateIsAnAnchor) {
+  PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
+  for (const double x : {0.0, 0.3, 0.6}) world_.add(at(x));
+  MapSnapshot map = *world_.snapshot();
+  auto culled = std::make_shared<KeyframeView>(map.keyframe(KeyframeId(1)));
+  culled->keyframe.culled = true;
+  culled->keyframe.parent = KeyframeId(0);
+  map.keyframes[1] = culled;
+  for (int32_t k = 0; k < 3; ++k) {
+    KeyframeImages images = stereo(at(0.3 * k));
+    images.color = to_rgb(world_.picture(at(0.3 * k)));
+    const size_t before = mapper.gaussians().size();
+    mapper.add_keyframe(map, KeyframeId(k), images, executor_);
+    EXPECT_EQ(mapper.gaussians().size() > before, k != 1) << k;
+    EXPECT_EQ(mapper.newest_with_pictures(), k == 2 ? 2u : 0u);
+  }
+}
+
 }  // namespace
 }  // namespace photoslam

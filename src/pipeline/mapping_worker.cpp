@@ -7,12 +7,6 @@
 
 namespace photoslam {
 
-bool replaces(const MappingMessage& newer, const MappingMessage& last) {
-  const bool only_poses =
-      last.update.map && !last.update.keyframe.valid() && !last.update.session && last.iterations == 0;
-  return only_poses && newer.update.map;
-}
-
 MappingWorker::MappingWorker(const SystemOptions& options, const RunSettings& settings, MapperSensor sensor,
                              Executor& executor, Autosave& autosave)
     : mapper_(options.photorealistic_mapping, std::move(sensor), settings.seed, settings.gpu),
@@ -31,7 +25,9 @@ void MappingWorker::handle(const MappingMessage& message) {
   if (message.update.map && !message.update.keyframe.valid()) {
     mapper_.update_poses(*message.update.map);
   } else if (message.update.map) {
-    mapper_.add_keyframe(*message.update.map, message.update.keyframe, *message.update.images, executor_);
+    const KeyframeImages none;
+    const KeyframeImages& images = message.update.images ? *message.update.images : none;
+    mapper_.add_keyframe(*message.update.map, message.update.keyframe, images, executor_);
   }
   if (message.update.session) autosave_.ended(save(*message.update.session));
   train(message.iterations);
@@ -44,13 +40,13 @@ Status MappingWorker::save(Archive& session) {
 
 bool MappingWorker::train_while_idle() {
   freeze_if_due();
-  if (!mapper_.has_keyframes()) return false;
+  if (!mapper_.newest_with_pictures()) return false;
   train(1);
   return true;
 }
 
 void MappingWorker::train(int count) {
-  for (int i = 0; i < count && mapper_.has_keyframes(); ++i) {
+  for (int i = 0; i < count && mapper_.newest_with_pictures(); ++i) {
     mapper_.train({}, executor_);
     ++iterations;
   }
@@ -68,9 +64,10 @@ void MappingWorker::update_figures() {
   constexpr double kComparisonSeconds = 1.0;
   gaussians = mapper_.gaussians().size();
   training_psnr = mapper_.training_psnr();
-  if (!preview_ || !mapper_.has_keyframes() || since_comparison_.seconds() < kComparisonSeconds) return;
+  const auto newest = mapper_.newest_with_pictures();
+  if (!preview_ || !newest || since_comparison_.seconds() < kComparisonSeconds) return;
   since_comparison_.restart();
-  auto comparison = std::make_shared<const KeyframeComparison>(mapper_.compare(mapper_.num_keyframes() - 1, executor_));
+  auto comparison = std::make_shared<const KeyframeComparison>(mapper_.compare(*newest, executor_));
   std::lock_guard lock(mutex_);
   comparison_ = std::move(comparison);
 }

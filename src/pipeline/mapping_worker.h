@@ -11,26 +11,10 @@
 #include "base/result.h"
 #include "pipeline/autosave.h"
 #include "pipeline/frame_feed.h"
+#include "pipeline/mapping_queue.h"
 #include "pipeline/system_options.h"
 
 namespace photoslam {
-
-/// The geometric map has changed: by a keyframe that entered it or, without one, by a loop. Or it is to be saved.
-struct MapUpdate {
-  std::shared_ptr<const MapSnapshot> map;
-  KeyframeId keyframe;
-  std::shared_ptr<const KeyframeImages> images;
-  std::shared_ptr<Archive> session;  ///< Or, without a map: header and geometric map, to be completed and saved.
-};
-
-/// What photorealistic mapping is asked to do: first take over the change, if there is one, then train.
-struct MappingMessage {
-  MapUpdate update;    ///< Without a map: nothing has changed.
-  int iterations = 0;  ///< By logical time: so many, now.
-};
-
-/// Whether a message is needless once a newer one waits right behind it: it brings nothing but poses, and so does that.
-bool replaces(const MappingMessage& newer, const MappingMessage& last);
 
 /// Runs photorealistic mapping behind a message queue, freezes the map that counts as the online result, and keeps the
 /// figures that others may read at any time.

@@ -84,7 +84,8 @@ struct RunOutcome {
   FrozenMap final;                   ///< After refinement.
   int iterations = 0;
   int loops_closed = 0;
-  int loops_reconnected = 0;  ///< Times that tracking itself came back to an old part of the map.
+  int loops_reconnected = 0;           ///< Times that tracking itself came back to an old part of the map.
+  int keyframes_without_pictures = 0;  ///< They waited for photorealistic mapping, and were too many.
   double mapping_cpu_seconds = 0;
   double seconds_online = 0, seconds_drain = 0, seconds_refine = 0, seconds_total = 0;
   std::optional<GpuUse> gpu;  ///< Nothing: there was none.

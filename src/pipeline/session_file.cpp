@@ -19,7 +19,7 @@
 namespace photoslam {
 namespace {
 
-constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 8, .oldest = 8};
+constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 9, .oldest = 9};
 
 /// Lets deflate or inflate work through the input; their counts have 32 bits.
 template <class Step>
@@ -82,11 +82,19 @@ void SessionHeader::serialize(Archive& a) {
   PinholeCamera& c = sensor.camera;
   a(c.width, c.height, c.fx, c.fy, c.cx, c.cy, sensor.metres_per_depth_unit, sensor.stereo_baseline_m);
   serialize_image(a, sensor.mask);
-  a(bf, configuration);
+  a(bf, configuration, num_settled);
 }
 
 Status write_session(const std::filesystem::path& path, const Archive& session) {
   return write_checked_file(path, kSessionFile, packed(session.bytes()));
+}
+
+std::string describe_unsaved_session(const std::filesystem::path& path, const std::string& why) {
+  std::error_code ignored;
+  const std::string before = std::filesystem::is_regular_file(path, ignored)
+                                 ? "is left as it is, and can be continued with --load-map"
+                                 : "was never written";
+  return fmt::format("the map is not saved as a session: {}; {} {}", why, path.string(), before);
 }
 
 Result<std::string> read_session(const std::filesystem::path& path) {

@@ -18,12 +18,16 @@ struct SessionHeader {
   MapperSensor sensor;        ///< Its camera is undistorted or rectified, as everything in the map sees the world.
   double bf = 0;              ///< fx * baseline [px m]; 0: one camera without depth.
   std::string configuration;  ///< TOML, for the record.
+  int num_settled = 0;        ///< See LoopCloser: in the keyframes after these, loops are still to be looked for.
   void serialize(Archive& archive);
 };
 
 /// The file of a session: header, geometric map, photorealistic map, in one archive, compressed. Written atomically, so
 /// that the session before survives a crash at any moment.
 Status write_session(const std::filesystem::path& path, const Archive& session);
+
+/// For a user whose session could not be saved: why, and what there is instead.
+std::string describe_unsaved_session(const std::filesystem::path& path, const std::string& why);
 
 /// The bytes of a session, checked; its folder may be given instead of the file.
 Result<std::string> read_session(const std::filesystem::path& path);

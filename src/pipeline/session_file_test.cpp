@@ -149,8 +149,34 @@ TEST_F(SessionTest, OneThatAFailureLeftHalfDoneDoesNotReplaceTheOneBefore) {
     EXPECT_TRUE(outcome.failure.starts_with("photorealistic mapping: ")) << outcome.failure;
     EXPECT_TRUE(*read_session(file) == *bytes);
     ASSERT_EQ(outcome.messages.size(), 1u);
-    EXPECT_THAT(outcome.messages[0], AllOf(StartsWith("session: " + file.string()), HasSubstr("is left as it is")));
+    EXPECT_THAT(outcome.messages[0], AllOf(StartsWith("session: "), HasSubstr("gaussians half changed"),
+                                           HasSubstr(file.string() + " is left as it is"), HasSubstr("--load-map")));
     EXPECT_GT(outcome.final.gaussians.size(), 0u) << "the map itself is not lost";
+  }
+}
+
+TEST_F(SessionTest, WhatWasSavedInBetweenSurvivesAFailure) {
+  for (const double interval : {1e-6, 0.0}) {
+    RunSettings failing = settings("in-between");
+    failing.threads = 1;
+    failing.autosave_s = interval;
+    TallFrames source(60, 30);
+    const RunOutcome outcome = run_slam({}, failing, source);
+    EXPECT_TRUE(outcome.failure.starts_with("photorealistic mapping: ")) << outcome.failure;
+    ASSERT_EQ(outcome.messages.size(), 1u);
+    const std::string file = (folder / "in-between").string();
+    if (interval == 0) {
+      EXPECT_THAT(outcome.messages[0], HasSubstr(file + " was never written"));
+      continue;
+    }
+    EXPECT_THAT(outcome.messages[0], HasSubstr(file + " is left as it is"));
+    RunSettings continuing = settings("");
+    continuing.loaded_session = std::make_shared<const std::string>(*read_session(file));
+    const RunOutcome continued = run(20, continuing, 20);
+    EXPECT_EQ(continued.failure, "");
+    EXPECT_TRUE(continued.frames.back().has_pose);
+    EXPECT_GT(continued.final.gaussians.size(), 200u);
+    std::filesystem::remove(file);
   }
 }
 
@@ -174,6 +200,38 @@ TEST_F(SessionTest, ASmallerBudgetOfGaussiansHoldsForTheLoadedMap) {
   CornerSource source(12);
   EXPECT_EQ(run_slam(options, localize, source).final.gaussians.size(), first->final.gaussians.size())
       << "it is left as it is";
+}
+
+TEST_F(SessionTest, AnAdjustmentThatIsDueIsMadeWhenItIsContinued) {
+  struct Parts {
+    explicit Parts(const std::string& session) {
+      Archive reader(session);
+      reader(header, geometry, mapper);
+    }
+    const SourceInfo info = CornerSource(1).info();
+    SessionHeader header;
+    GeometryMapper geometry{{}, {}, info.camera, 1};
+    PhotorealisticMapper mapper{{}, {info.camera, info.metres_per_depth_unit}, 1};
+  };
+  Parts parts(*bytes);
+  EXPECT_FALSE(parts.geometry.snapshot()->adjustment_is_due);
+  EXPECT_EQ(parts.header.num_settled, static_cast<int>(parts.mapper.num_keyframes()));
+  const auto map = parts.geometry.correct({.adjustment_is_due = true});
+  parts.mapper.update_poses(*map);
+  Archive due;
+  due(parts.header, parts.geometry, parts.mapper);
+
+  RunSettings at_once = settings("adjusted");
+  at_once.deterministic = false;
+  at_once.loaded_session = std::make_shared<const std::string>(due.bytes());
+  for (const bool localize_only : {true, false}) {
+    at_once.localize_only = localize_only;
+    EXPECT_EQ(run(0, at_once).failure, "");
+    EXPECT_EQ(std::filesystem::exists(folder / "adjusted"), !localize_only);
+  }
+  Parts adjusted(*read_session(folder / "adjusted"));
+  EXPECT_FALSE(adjusted.geometry.snapshot()->adjustment_is_due);
+  EXPECT_EQ(adjusted.geometry.snapshot()->num_corrections, map->num_corrections + 1);
 }
 
 TEST_F(SessionTest, TellsWhichOptionsDifferFromThoseItWasMadeWith) {

@@ -58,7 +58,7 @@ Result<MergedSessions> merge_sessions(const SystemOptions& options, const std::s
 
   LoopCloser closer(options.loop_closure, options.features, one.header.sensor.camera, one.header.bf);
   auto map = one.geometry.snapshot();
-  closer.resume(*map);
+  closer.resume(*map, one.header.num_settled);
   const size_t num_keyframes_of_first = map->keyframes.size();
   move_beside(*map, two);
   one.geometry.append(two.geometry);
@@ -73,6 +73,7 @@ Result<MergedSessions> merge_sessions(const SystemOptions& options, const std::s
   while (one.mapper.has_seams()) one.mapper.train(std::nullopt, executor);
 
   MergedSessions merged;
+  one.header.num_settled = closer.num_settled();
   merged.session(one.header, one.geometry, one.mapper);
   merged.map = one.mapper.freeze();
   for (const auto& view : map->keyframes) merged.keyframe_times_ns.push_back(view->keyframe.frame->timestamp_ns);

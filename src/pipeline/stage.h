@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <deque>
 #include <exception>
 #include <functional>
 #include <mutex>
@@ -57,13 +58,13 @@ class Stage {
     std::function<void(Message)> handle;
     std::function<bool()> idle = {};      ///< Called while nothing waits; false: nothing to do until a message comes.
     std::function<void()> on_start = {};  ///< Runs first on the stage's thread.
-    /// With this, posters never wait: the queue grows, but what waits last is forgotten when a newer message replaces
-    /// it.
-    std::function<bool(const Message& newer, const Message& last)> replaces = {};
+    /// With this, posters never wait: the queue grows, but before each message this may change or remove what waits,
+    /// oldest first. Called by the poster.
+    std::function<void(const Message& newer, std::deque<Message>& waiting)> make_way = {};
   };
 
   Stage(size_t capacity, bool threaded, Work work, FailureReport& failures)
-      : queue_(capacity, work.replaces ? Overflow::grow : Overflow::block),
+      : queue_(capacity, work.make_way ? Overflow::grow : Overflow::block),
         work_(std::move(work)),
         failures_(failures),
         threaded_(threaded) {
@@ -73,10 +74,10 @@ class Stage {
   Stage(const Stage&) = delete;
   Stage& operator=(const Stage&) = delete;
 
-  /// Waits while the queue is full, unless Work::replaces says otherwise.
+  /// Waits while the queue is full, unless Work::make_way says otherwise.
   void post(Message message) {
-    if (threaded_ && work_.replaces) {
-      queue_.push(std::move(message), work_.replaces);
+    if (threaded_ && work_.make_way) {
+      queue_.push(std::move(message), work_.make_way);
     } else if (threaded_) {
       queue_.push(std::move(message));
     } else {

@@ -59,7 +59,7 @@ TEST_P(StageTest, WhateverIsThrownIsReported) {
 INSTANTIATE_TEST_SUITE_P(Threading, StageTest, ::testing::Bool(),
                          [](const auto& suite) { return suite.param ? "OwnThread" : "Inline"; });
 
-TEST(Stage, ThatForgetsWhatIsReplacedKeepsNobodyWaiting) {
+TEST(Stage, WhereOthersMakeWayNobodyWaits) {
   std::stop_source stop;
   FailureReport failures{stop};
   std::atomic<bool> may_go_on = false;
@@ -71,12 +71,15 @@ TEST(Stage, ThatForgetsWhatIsReplacedKeepsNobodyWaiting) {
                           while (!may_go_on) std::this_thread::yield();
                           seen.push_back(i);
                         },
-                    .replaces = [](int newer, int last) { return last < 0 && newer != 50; }},
+                    .make_way =
+                        [](int newer, std::deque<int>& waiting) {
+                          if (!waiting.empty() && waiting.back() < 0 && newer != 50) waiting.pop_back();
+                        }},
                    failures);
   stage.post(0);
   while (stage.backlog() > 0) std::this_thread::yield();  // it is being handled
   for (int i = 1; i < 100; ++i) {
-    stage.post(-i);  // replaced by the next one
+    stage.post(-i);  // makes way for the next one
     stage.post(i);
   }
   may_go_on = true;

@@ -67,6 +67,7 @@ class Session {
         loop_closer_(options.loop_closure, options.features, localization_.camera(), localization_.bf()),
         autosave_(settings.session_file.empty() || settings.localize_only ? 0 : settings.autosave_s),
         mapping_(options, settings, localization_.sensor(), executor_, autosave_),
+        mapping_limit_(options.pipeline.waiting_pictures_mb),
         newest_map_(settings_.loaded_session ? load_session() : nullptr),
         visible_map_(newest_map_),
         mapping_stage_(kStageQueue, threaded_, mapping_work(), failures_),
@@ -92,6 +93,7 @@ class Session {
   void drop_gaussians_beyond_budget();
   std::shared_ptr<Archive> begin_session();
   void save_session();
+  void report_missing_pictures();
   void save_if_due();
   void save_in_between();
   void deliver(MapUpdate update);
@@ -118,6 +120,7 @@ class Session {
   LoopCloser loop_closer_;
   Autosave autosave_;
   MappingWorker mapping_;
+  MappingQueueLimit mapping_limit_;
 
   // Real time: the newest map. Logical time: results in order, each taken when its frame has come.
   mutable std::mutex mutex_;
@@ -158,7 +161,7 @@ std::shared_ptr<const MapSnapshot> Session::load_session() {
   PHOTOSLAM_CHECK(whole.ok(), "the session cannot be continued: {}; begin a new one", whole.error().message);
   if (!settings_.localize_only) drop_gaussians_beyond_budget();
   auto map = geometry_.snapshot();
-  loop_closer_.resume(*map);
+  loop_closer_.resume(*map, header.num_settled);
   localization_.resume(static_cast<int>(map->keyframes.size()), next_free_place(*map));
   mapping_.gaussians = mapping_.mapper().gaussians().size();
   return map;
@@ -176,7 +179,8 @@ void Session::drop_gaussians_beyond_budget() {
 /// Header and geometric map; the photorealistic map follows.
 std::shared_ptr<Archive> Session::begin_session() {
   auto session = std::make_shared<Archive>();
-  SessionHeader header{localization_.sensor(), localization_.bf(), config_as_toml(options_)};
+  SessionHeader header{localization_.sensor(), localization_.bf(), config_as_toml(options_),
+                       loop_closer_.num_settled()};
   (*session)(header, geometry_);
   return session;
 }
@@ -187,16 +191,26 @@ void Session::save_session() {
   std::string problem;
   try {
     if (const Status maps = check_session_maps(geometry_, mapping_.mapper()); !maps) {
-      problem = fmt::format("{} is left as it is: {}", settings_.session_file.string(), maps.error().message);
+      problem = maps.error().message;
     } else if (const Status saved = mapping_.save(*begin_session()); !saved) {
       problem = saved.error().message;
     }
   } catch (...) {
-    problem = fmt::format("{} is left as it is: {}", settings_.session_file.string(), exception_text());
+    problem = exception_text();
   }
   if (problem.empty()) return;
+  problem = describe_unsaved_session(settings_.session_file, problem);
   if (!failures_.text().empty()) outcome_.messages.push_back("session: " + problem);  // the cause is told already
   failures_.report("session", problem);
+}
+
+void Session::report_missing_pictures() {
+  outcome_.keyframes_without_pictures = mapping_limit_.num_without_pictures();
+  if (outcome_.keyframes_without_pictures == 0) return;
+  outcome_.messages.push_back(fmt::format(
+      "{} keyframes were mapped without their pictures: photorealistic mapping was so slow that more than {:g} MB of "
+      "them waited (pipeline.waiting_pictures_mb)",
+      outcome_.keyframes_without_pictures, options_.pipeline.waiting_pictures_mb));
 }
 
 /// While frames arrive: asks for it, and waits for nothing.
@@ -260,6 +274,7 @@ void Session::take_correction() {
 
 /// On the thread of loop closure.
 void Session::look_for_loops() {
+  if (stop_.stop_requested()) return;
   std::shared_ptr<const MapSnapshot> map;
   {
     std::lock_guard lock(mutex_);
@@ -276,7 +291,7 @@ void Session::look_for_loops() {
 
 /// After both stages have ended: what loop closure found last, and what it has not looked at yet.
 void Session::close_remaining_loops() {
-  if (logical_time_) return;
+  if (logical_time_ || settings_.localize_only) return;
   take_correction();
   const auto stopped = [this] { return stop_.stop_requested(); };
   while (newest_map_ && !stopped()) {
@@ -292,9 +307,11 @@ Stage<MappingMessage>::Work Session::mapping_work() {
   work.handle = [this](const MappingMessage& message) { mapping_.handle(message); };
   if (!logical_time_ && !settings_.localize_only) work.idle = [this] { return mapping_.train_while_idle(); };
   work.on_start = in_background;
-  // At real-time pace nothing that is tracked or placed waits for gaussians. A keyframe that waits for them keeps its
-  // pictures in memory, so that where time plays no role the queue is bounded.
-  if (!logical_time_ && settings_.pace == Pace::realtime) work.replaces = replaces;
+  // At real-time pace nothing that is tracked or placed waits for gaussians. Where time plays no role it does, and no
+  // keyframe loses its pictures.
+  if (!logical_time_ && settings_.pace == Pace::realtime) {
+    work.make_way = [this](const auto& newer, auto& waiting) { mapping_limit_.make_way(newer, waiting); };
+  }
   return work;
 }
 
@@ -429,7 +446,7 @@ void Session::tell(const std::function<void(const Progress&)>& on_progress, cons
 }
 
 void Session::refine(const std::function<void(const Progress&)>& on_progress) {
-  if (!mapping_.mapper().has_keyframes() || settings_.localize_only) return;
+  if (!mapping_.mapper().newest_with_pictures() || settings_.localize_only) return;
   const Stopwatch clock;
   double last_report = 0;
   autosave_.ended();  // what was asked for while the stages ended
@@ -457,6 +474,8 @@ void Session::refine(const std::function<void(const Progress&)>& on_progress) {
 
 RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress) {
   const double busy_before = settings_.gpu ? settings_.gpu->busy_seconds() : 0;
+  // What a loaded session left undone.
+  if (newest_map_ && !logical_time_ && !settings_.localize_only && options_.loop_closure.enabled) loop_stage_.post({});
   if (!threaded_) {
     localize_all([&] {
       save_if_due();
@@ -494,6 +513,7 @@ RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress)
   outcome_.final = mapping_.mapper().freeze();
   save_session();
 
+  report_missing_pictures();
   outcome_.frames = std::move(outcomes_);
   if (newest_map_) outcome_.component_of_keyframe = connected_components(*newest_map_);
   outcome_.iterations = mapping_.iterations;

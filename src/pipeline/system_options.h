@@ -18,6 +18,7 @@ struct PipelineOptions {
   int keyframe_queue = 2;
   int keyframe_lag_frames = 3;
   int iterations_per_frame = 4;
+  double waiting_pictures_mb = 500;
   void visit(OptionVisitor& visitor);
 };
 

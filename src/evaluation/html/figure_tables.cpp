@@ -117,6 +117,7 @@ std::string mapping_table(const Report& report) {
   return Table("Map")
       .row("gaussians", show(m.gaussians))
       .row("keyframes", show(m.keyframes))
+      .row("keyframes without pictures", show(m.keyframes_without_pictures))
       .row("iterations", show(m.iterations))
       .row("time per iteration", show(m.ms_per_iteration, 1, "ms"))
       .row("processor time of mapping", show(m.cpu_seconds, 1, "s"))
