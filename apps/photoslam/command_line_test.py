@@ -465,6 +465,25 @@ class RunTest(CommandLineTest):
         self.assertGreater(begin, 1000)
         self.assertGreater(after, before)
 
+    def test_held_out_frames_are_scored_and_never_mapped(self):
+        output = self.run_deterministic("run", "--hold-out", "3", "--set", "localization.keyframes.min_interval_s=0", "--set",
+                                        "localization.keyframes.max_translation=0.01")
+        report = json.loads((output / "report.json").read_text(encoding="utf-8"))
+        with (output / "frames.csv").open(encoding="utf-8") as file:
+            mapped = [row["keyframe"] != "" for row in csv.DictReader(file)]
+        left_out = set(range(3)) - {i % 3 for i, is_keyframe in enumerate(mapped) if is_keyframe}
+        self.assertEqual(len(left_out), 1, mapped)
+        self.assertEqual(report["image_held_out"]["frames"], len(mapped[left_out.pop()::3]))
+        self.assertGreater(report["image_held_out"]["psnr_db"], 15)
+
+    def test_preview_is_a_whole_picture(self):
+        preview = self.folder / "preview.png"
+        self.run_deterministic("run", "--preview", preview)
+        data = preview.read_bytes()
+        self.assertTrue(data.startswith(b"\x89PNG"))
+        self.assertTrue(data.endswith(b"IEND\xaeB`\x82"))
+        self.assertEqual([path.name for path in self.folder.iterdir() if "tmp" in path.name], [])
+
     def test_eval_counts_only_what_the_beginning_saw(self):
         output = self.run_deterministic("run")
         table = self.folder / "scores.csv"

@@ -13,8 +13,8 @@ struct KeyframeDecisionOptions {
   double min_interval_s = 0.1;
   double max_interval_s = 1.0;     ///< A keyframe at least this often while the camera moves.
   double min_tracked_ratio = 0.7;  ///< Tracked landmarks, relative to the most since the last keyframe.
-  double max_rotation_deg = 7.0;
-  double max_translation = 0.10;  ///< Relative to the median depth of the tracked landmarks.
+  double max_rotation_deg = 7.0;   ///< A keyframe when the shares of this and of max_translation add up to one.
+  double max_translation = 0.10;   ///< Relative to the median depth of the tracked landmarks.
   void visit(OptionVisitor& visitor);
 };
 

@@ -37,12 +37,12 @@ std::optional<DepthRange> search_range(const MapSnapshot& map, const KeyframeVie
 }
 
 std::vector<KeyframeId> sweep_neighbours(const KeyframeDepthOptions& options, const MapSnapshot& map, KeyframeId id,
-                                         KeyframeId end) {
+                                         const std::function<bool(KeyframeId)>& has_picture) {
   const KeyframeView& view = map.keyframe(id);
   std::vector<KeyframeId> chosen;
   for (const CovisibleKeyframe& candidate : view.covisible) {
     if (static_cast<int>(chosen.size()) >= options.neighbours) break;
-    if (!(candidate.keyframe < end)) continue;
+    if (!has_picture(candidate.keyframe)) continue;
     const SE3 other_from_this =
         map.keyframe(candidate.keyframe).keyframe.camera_from_world * view.keyframe.camera_from_world.inverse();
     const double parallax = other_from_this.translation.norm() / std::max(view.median_depth, 1e-9);

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -26,9 +27,9 @@ struct KeyframeDepthOptions {
 std::optional<DepthRange> search_range(const MapSnapshot& map, const KeyframeView& view);
 
 /// Covisible keyframes from whose pictures depth can be swept: seen from the scene's median depth they are far enough
-/// apart to measure and near enough to match; the most covisible first, at most `options.neighbours`, only those before
-/// `end`.
+/// apart to measure and near enough to match; the most covisible first, at most `options.neighbours`, only those with a
+/// picture.
 std::vector<KeyframeId> sweep_neighbours(const KeyframeDepthOptions& options, const MapSnapshot& map, KeyframeId id,
-                                         KeyframeId end);
+                                         const std::function<bool(KeyframeId)>& has_picture);
 
 }  // namespace photoslam

@@ -135,14 +135,15 @@ void PhotorealisticMapper::update_poses(const MapSnapshot& map) {
 }
 
 /// What would grow with every lap: pictures of places that newer keyframes show as well, and blocks of few gaussians.
-/// The next keyframe may still need the picture of the newest one. In a newer map the parent may be one that has not
+/// The next keyframe may still need the newest picture. In a newer map the parent may be one that has not
 /// come yet: then its child keeps its gaussians until it has.
 void PhotorealisticMapper::release_culled(const MapSnapshot& map) {
   std::vector<Adoption> adoptions;
+  const auto newest = newest_with_pictures();
   for (size_t i = 0; i + 1 < views_.size(); ++i) {
     const Keyframe& keyframe = map.keyframe(KeyframeId(static_cast<int32_t>(i))).keyframe;
     if (!keyframe.culled) continue;
-    if (views_[i].has_images()) retire(i);
+    if (views_[i].has_images() && i != newest) retire(i);
     const auto child = static_cast<int>(i), parent = keyframe.parent.value;
     if (model_.size(child) == 0 || keyframe.parent.value >= std::ssize(anchors_from_world_)) continue;
     const SE3& parent_from_world = anchors_from_world_[static_cast<size_t>(parent)];
@@ -286,13 +287,14 @@ void PhotorealisticMapper::sweep_picture(const MapSnapshot& map, size_t index, E
     right_from_left.translation.x() = -sensor_.stereo_baseline_m;
     others.push_back({&view.right, view.picture.camera, right_from_left});
   }
-  auto neighbours = sweep_neighbours(options_.depth, map, id, KeyframeId(static_cast<int32_t>(views_.size())));
+  auto neighbours = sweep_neighbours(options_.depth, map, id, [&](KeyframeId other) {
+    return static_cast<size_t>(other.value) < views_.size() && views_[static_cast<size_t>(other.value)].has_images();
+  });
   if (!others.empty() && !neighbours.empty()) neighbours.pop_back();  // the right image does for one of them
   std::vector<ImageU8> pictures;
   pictures.reserve(neighbours.size());
   for (const KeyframeId neighbour : neighbours) {
     const auto i = static_cast<size_t>(neighbour.value);
-    if (!views_[i].has_images()) continue;
     pictures.push_back(to_grey(views_[i].picture.color));
     others.push_back({&pictures.back(), view.picture.camera, anchors_from_world_[i] * world_from_reference});
   }
@@ -434,11 +436,12 @@ void PhotorealisticMapper::maintain(std::optional<double> progress, Executor& ex
   const bool growing = !progress || *progress < kGrowthEnd;
   if (growing && options_.reseed_interval > 0 && iteration_ % options_.reseed_interval == 0) {
     const auto active = schedule_.active();
-    const auto view = active[static_cast<size_t>(random_.index(static_cast<int>(active.size())))];
-    show(static_cast<size_t>(view), executor);
+    const auto view = static_cast<size_t>(active[static_cast<size_t>(random_.index(static_cast<int>(active.size())))]);
+    show(view, executor);
     const int cell = cell_size(options_.seeding);
-    const bool measured = !views_[static_cast<size_t>(view)].picture.depth.empty();  // what holes borrow is coarse
-    seed(static_cast<size_t>(view), {measured ? std::max(1, cell / 2) : cell, options_.reseed_color_error, true}, {});
+    const bool measured = !views_[view].picture.depth.empty();  // what holes borrow is coarse
+    const bool has_holes = !views_[view].lacks_depth && view != newest_with_pictures();
+    seed(view, {measured ? std::max(1, cell / 2) : cell, options_.reseed_color_error, has_holes}, {});
   }
   if (iteration_ % options_.densification.interval != 0) return;
   if (progress && growing && options_.densification.enabled) {
@@ -458,6 +461,19 @@ KeyframeComparison PhotorealisticMapper::compare(size_t keyframe, Executor& exec
           newest ? newest_features_ : std::vector<DepthPixel>()};
 }
 
+/// The keyframe nearest in time, mostly itself, whose exposure is more than a guess.
+size_t PhotorealisticMapper::nearest_with_exposure(size_t index) const {
+  const auto has_exposure = [&](size_t i) {
+    return i < views_.size() &&
+           (views_[i].has_images() || views_[i].exposure_is_known || schedule_.uses(static_cast<int>(i)) > 0);
+  };
+  for (size_t distance = 0; distance < views_.size(); ++distance) {
+    if (distance <= index && has_exposure(index - distance)) return index - distance;
+    if (has_exposure(index + distance)) return index + distance;
+  }
+  return index;
+}
+
 FrozenMap PhotorealisticMapper::freeze() const {
   FrozenMap frozen;
   frozen.anchors_from_world = anchors_from_world_;
@@ -467,7 +483,7 @@ FrozenMap PhotorealisticMapper::freeze() const {
   model_.for_each([&](size_t i) { of_anchor[static_cast<size_t>(model_.anchor(i))].push_back(model_.get(i)); });
   for (size_t i = 0; i < views_.size(); ++i) {
     frozen.keyframes_from_world.push_back(view_from_world(i));
-    frozen.keyframe_exposures.push_back(views_[i].exposure.exposure());
+    frozen.keyframe_exposures.push_back(views_[nearest_with_exposure(i)].exposure.exposure());
     frozen.gaussians.add(frozen.gaussians.add_anchor(), of_anchor[i]);
   }
   return frozen;

@@ -160,6 +160,7 @@ class PhotorealisticMapper {
   splatting::TrainOptions train_options(std::optional<double> progress, int factor) const;
   void add_pictures(const MapSnapshot& map, const KeyframeImages& images, Executor& executor);
   void set_images(const ImageU8& color, const ImageU16& depth, const ImageU8& mask, TrainingView& view) const;
+  size_t nearest_with_exposure(size_t view) const;
   double megabytes(const TrainingView& view) const;
   void retire(size_t view);
   void release_culled(const MapSnapshot& map);

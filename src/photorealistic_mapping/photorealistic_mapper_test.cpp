@@ -402,6 +402,22 @@ TEST_F(PhotorealisticMapperTest, ForgetsPicturesBeyondTheBudgetAndGoesOn) {
   }
 }
 
+TEST_F(PhotorealisticMapperTest, AKeyframeWithoutPicturesIsAsBrightAsItsNeighbour) {
+  PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
+  add(mapper, at(0), stereo(at(0)));
+  for (int i = 0; i < 100; ++i) mapper.train({}, executor_);
+  for (const double x : {0.1, 0.2}) {
+    world_.add(at(x));
+    mapper.add_keyframe(*world_.snapshot(), KeyframeId(count_++), {}, executor_);
+  }
+  add(mapper, at(0.3), stereo(at(0.3)), 0.7);
+  for (int i = 0; i < 200; ++i) mapper.train({}, executor_);
+  const auto exposures = mapper.freeze().keyframe_exposures;
+  EXPECT_NEAR(exposures[3].gain[1], 0.7f, 0.05f);
+  EXPECT_EQ(exposures[1].gain[1], exposures[0].gain[1]);
+  EXPECT_EQ(exposures[2].gain[1], exposures[3].gain[1]) << "what it was born with is older";
+}
+
 TEST_F(PhotorealisticMapperTest, AKeyframeWithoutPicturesIsAnAnchor) {
   PhotorealisticMapper mapper({}, {.camera = kCamera}, 1);
   const auto add_anchor = [&](double x) {

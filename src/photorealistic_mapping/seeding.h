@@ -33,8 +33,8 @@ struct SeedingOptions {
 struct SeedingRound {
   int cell;                ///< Side of the cells, in pixels of the picture.
   double min_color_error;  ///< Cells are seeded whose mean colour is off by more (squared, all channels).
-  /// In a picture without depth the holes of the map take the depth that is drawn around them. For an old keyframe:
-  /// what a new one sees first is no hole, and is worth a measurement when there is enough of it.
+  /// In a picture without depth the holes of the map take the depth that is drawn around them. Not for what a new
+  /// keyframe sees first, nor where a measurement was wanted and failed: what is open there is no hole.
   bool fills_holes = false;
 };
 

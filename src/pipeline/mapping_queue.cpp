@@ -23,7 +23,8 @@ void take_newest_map(const MappingMessage& newer, std::deque<MappingMessage>& wa
 }
 
 /// A keyframe whose pictures leave the smallest hole between its neighbours that have some, so that no part of the walk
-/// loses all of them. The first stays: where a map begins there is nothing else to train on.
+/// loses all of them. The first that waits stays while others can go: where a map begins there is nothing else to train
+/// on.
 MappingMessage& most_dispensable(const std::vector<MappingMessage*>& with_pictures, KeyframeId newest) {
   MappingMessage* best = with_pictures.front();
   int smallest = 0;

@@ -36,7 +36,7 @@ class MappingQueueLimit {
   /// As Stage::Work::make_way.
   void make_way(const MappingMessage& newer, std::deque<MappingMessage>& waiting);
 
-  /// Keyframes that have lost their pictures, but for those that others had made redundant. From any thread.
+  /// Keyframes that have lost their pictures to the limit. From any thread.
   int num_without_pictures() const { return num_without_pictures_; }
 
  private:

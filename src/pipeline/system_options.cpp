@@ -15,11 +15,10 @@ void PipelineOptions::visit(OptionVisitor& v) {
           keyframe_lag_frames);
   v.value({"iterations_per_frame", "iterations", 0, 1000, "By logical time, training iterations for each input frame."},
           iterations_per_frame);
-  v.value(
-      {"waiting_pictures_mb", "MB", 1.0, 1e6,
-       "At real-time pace, when pictures of more keyframes wait for photorealistic mapping, every second one of them "
-       "is mapped without."},
-      waiting_pictures_mb);
+  v.value({"waiting_pictures_mb", "MB", 1.0, 1e6,
+           "At real-time pace, when pictures of more keyframes wait for photorealistic mapping, more and more of them, "
+           "evenly spread, are mapped without."},
+          waiting_pictures_mb);
 }
 
 void SystemOptions::visit(OptionVisitor& v) {

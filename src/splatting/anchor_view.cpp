@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/check.h"
 #include "splatting/gaussian.h"
 #include "splatting/view.h"
 
@@ -25,6 +26,7 @@ bool is_sane(const Camera& camera) {
 }  // namespace
 
 AnchorView make_anchor_view(const Pose& pose, const Camera& camera, const RenderOptions& options) {
+  PHOTOSLAM_CHECK(options.shrink_factor >= 1, "pictures shrunk by {}", options.shrink_factor);
   AnchorView view{};
   const double* r = pose.rotation;
   const double* t = pose.translation;

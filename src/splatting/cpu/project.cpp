@@ -147,8 +147,8 @@ namespace {
 HWY_EXPORT(project_block);
 
 /// Can any gaussian of the block touch a pixel? With s the largest deviation and the Jacobian bounded by its clamp, a
-/// splat reaches at most 3.33 (f/z sqrt(1 + clamp²) s + sqrt(0.3)) px beyond its centre, so each image border is a
-/// plane in camera space.
+/// splat reaches at most 3.33 (f/z sqrt(1 + clamp²) s + sqrt(0.3)) px beyond its centre, less in shrunk pictures, so
+/// each image border is a plane in camera space.
 bool block_in_view(const Block& block, const AnchorView& view, const Frame& frame) {
   float d[3], p[3];
   for (int i = 0; i < 3; ++i) d[i] = (block.center[i] - view.center[i]) - view.center_low[i];
