@@ -74,7 +74,8 @@ ImageU8 compose_preview(const Progress& progress) {
 }
 
 void PreviewWriter::show(const Progress& progress) {
-  if (path_.empty() || !progress.comparison || (!first_ && since_last_.seconds() < kIntervalSeconds)) return;
+  const bool is_due = first_ || progress.phase == Progress::Phase::done || since_last_.seconds() >= kIntervalSeconds;
+  if (path_.empty() || !progress.comparison || !is_due) return;
   first_ = false;
   since_last_.restart();
   const Status status = write_png(path_, compose_preview(progress));

@@ -21,6 +21,7 @@ std::string describe(const Progress& p) {
     case Progress::Phase::refining:
       return fmt::format("refining {:3.0f} %: {}", 100 * p.refined, map);
     case Progress::Phase::draining:
+    case Progress::Phase::done:
       return fmt::format("finishing: {}", map);
     case Progress::Phase::online:
       break;

@@ -67,9 +67,17 @@ void MappingWorker::update_figures() {
   const auto newest = mapper_.newest_with_pictures();
   if (!preview_ || !newest || since_comparison_.seconds() < kComparisonSeconds) return;
   since_comparison_.restart();
-  auto comparison = std::make_shared<const KeyframeComparison>(mapper_.compare(*newest, executor_));
+  compare(*newest);
+}
+
+void MappingWorker::compare(size_t keyframe) {
+  auto comparison = std::make_shared<const KeyframeComparison>(mapper_.compare(keyframe, executor_));
   std::lock_guard lock(mutex_);
   comparison_ = std::move(comparison);
+}
+
+void MappingWorker::show_newest() {
+  if (const auto newest = mapper_.newest_with_pictures(); newest && preview_) compare(*newest);
 }
 
 std::shared_ptr<const KeyframeComparison> MappingWorker::comparison() const {

@@ -34,6 +34,8 @@ class MappingWorker {
   /// The last picture of the newest keyframe beside its render, about a second old at most while training; null without
   /// RunSettings::preview. From any thread.
   std::shared_ptr<const KeyframeComparison> comparison() const;
+  /// Brings comparison() up to date. Call after the stage has finished.
+  void show_newest();
   /// Trains once more after the input has ended; `progress` as in PhotorealisticMapper::train().
   void refine(double progress);
 
@@ -53,6 +55,7 @@ class MappingWorker {
   void train(int count);
   void freeze_if_due();
   void update_figures();
+  void compare(size_t keyframe);
 
   PhotorealisticMapper mapper_;
   Executor& executor_;

@@ -510,6 +510,8 @@ RunOutcome Session::run(const std::function<void(const Progress&)>& on_progress)
   outcome_.online = mapping_.take_online();
   outcome_.seconds_drain = drain.seconds();
   refine(on_progress);
+  if (failures_.text().empty()) mapping_.show_newest();
+  tell(on_progress, progress(Progress::Phase::done));
   outcome_.final = mapping_.mapper().freeze();
   save_session();
 

@@ -13,7 +13,7 @@ namespace photoslam {
 
 /// Where a run stands, for people.
 struct Progress {
-  enum class Phase { online, draining, refining };
+  enum class Phase { online, draining, refining, done };
   Phase phase = Phase::online;
   int frames = 0;      ///< Processed so far …
   int num_frames = 0;  ///< … of so many; 0 when unknown.

@@ -266,10 +266,13 @@ TEST(RunSlam, ThePreviewShowsThePathSoFar) {
     source.defect_at = 6;
     std::vector<Vec3> last;
     int reports = 0;
+    bool is_done = false;
     const RunOutcome outcome = run_slam({}, settings, source, {}, [&](const Progress& progress) {
       ASSERT_GE(progress.positions.size(), last.size());
       EXPECT_TRUE(std::equal(last.begin(), last.end(), progress.positions.begin())) << "what was shown stays";
       last = progress.positions;
+      is_done = progress.phase == Progress::Phase::done;
+      EXPECT_TRUE(!is_done || progress.comparison) << "however short the run";
       ++reports;
     });
     std::vector<Vec3> path;
@@ -278,6 +281,7 @@ TEST(RunSlam, ThePreviewShowsThePathSoFar) {
     }
     EXPECT_EQ(path.size(), 19u);
     EXPECT_EQ(last, path) << "once each, in order";
+    EXPECT_TRUE(is_done);
     if (threads == 1) {
       EXPECT_GE(reports, 20) << "after every frame";
     }
