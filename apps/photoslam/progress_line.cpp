@@ -11,8 +11,8 @@
 namespace photoslam {
 namespace {
 
-constexpr double kRewriteInterval_s = 0.1;  // on a terminal
-constexpr double kLineInterval_s = 2.0;     // elsewhere
+constexpr double kRewriteSeconds = 0.1;  // on a terminal
+constexpr double kLineSeconds = 2.0;     // elsewhere
 
 std::string describe(const Progress& p) {
   std::string map = fmt::format("{} keyframes, {} gaussians", p.keyframes, p.gaussians);
@@ -45,7 +45,7 @@ void ProgressLine::show(const Progress& progress) {
     fmt::print(stderr, "{}  note: {}\n", open_ ? "\n" : "", message);
     open_ = false;
   }
-  if (!first_ && since_last_.seconds() < (terminal_ ? kRewriteInterval_s : kLineInterval_s)) return;
+  if (!first_ && since_last_.seconds() < (terminal_ ? kRewriteSeconds : kLineSeconds)) return;
   since_last_.restart();
   first_ = false;
   if (terminal_) {

@@ -23,10 +23,10 @@ class PhotorealisticMapperTest : public ::testing::Test {
  protected:
   void add(PhotorealisticMapper& mapper, const SE3& pose, KeyframeImages images, double gain = 1.0,
            const std::optional<splatting::Exposure>& known = {}) {
-    world_.add(pose);
-    images.color = to_rgb(world_.picture(pose));
+    world.add(pose);
+    images.color = to_rgb(world.picture(pose));
     for (uint8_t& v : images.color.values()) v = static_cast<uint8_t>(std::lround(std::min(255.0, gain * v)));
-    mapper.add_keyframe(*world_.snapshot(), KeyframeId(count_++), images, executor_, known);
+    mapper.add_keyframe(*world.snapshot(), KeyframeId(num_added++), images, executor, known);
   }
   /// Share of the gaussians within `tolerance` of the wall's depth, seen from the first keyframe.
   double share_on_the_wall(const PhotorealisticMapper& mapper, double tolerance) const {
@@ -36,7 +36,7 @@ class PhotorealisticMapperTest : public ::testing::Test {
       const splatting::Gaussian g = map.gaussians.get(i);
       const Vec3 mean(static_cast<double>(g.mean[0]), static_cast<double>(g.mean[1]), static_cast<double>(g.mean[2]));
       const Vec3 p = map.anchors_from_world[static_cast<size_t>(map.gaussians.anchor(i))].inverse() * mean;
-      const double wall = 4.0 + world_.wall.wall_slope * p.x();
+      const double wall = 4.0 + world.wall.wall_slope * p.x();
       near += std::abs(p.z() - wall) < tolerance * wall;
       ++all;
     });
@@ -45,12 +45,12 @@ class PhotorealisticMapperTest : public ::testing::Test {
   KeyframeImages stereo(const SE3& pose) const {
     SE3 right_from_left;
     right_from_left.translation.x() = -kBaseline;
-    return {{}, {}, world_.picture(right_from_left * pose)};
+    return {{}, {}, world.picture(right_from_left * pose)};
   }
 
-  testing::WallWithKeyframes world_{kCamera};
-  ThreadPool executor_{2};
-  int32_t count_ = 0;
+  testing::WallWithKeyframes world{kCamera};
+  ThreadPool executor{2};
+  int32_t num_added = 0;
 };
 
 TEST_F(PhotorealisticMapperTest, StereoSeedsTheSurfaceFromOneKeyframe) {
@@ -77,10 +77,10 @@ TEST_F(PhotorealisticMapperTest, DepthIsMeasuredOnlyForWhatTheMapDoesNotExplain)
     options.reseed_interval = 0;
     options.densification.interval = 1000;
     PhotorealisticMapper mapper(options, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
-    world_ = testing::WallWithKeyframes{kCamera};
-    count_ = 0;
+    world = testing::WallWithKeyframes{kCamera};
+    num_added = 0;
     add(mapper, at(0), stereo(at(0)));
-    for (int i = 0; i < 60; ++i) mapper.train({}, executor_);
+    for (int i = 0; i < 60; ++i) mapper.train({}, executor);
     const size_t before = mapper.gaussians().size();
     add(mapper, at(0.6), stereo(at(0.6)));  // an eighth of the picture is new
     return static_cast<int>(mapper.gaussians().size()) - static_cast<int>(before);
@@ -99,7 +99,7 @@ TEST_F(PhotorealisticMapperTest, ASmallBudgetIsSpreadOverThePictureAndKeptByWhat
   int below = 0;
   mapper.gaussians().for_each([&](size_t i) { below += mapper.gaussians().get(i).mean[1] > 0; });
   EXPECT_NEAR(below, 158, 30) << "126 of 240 rows";
-  for (int i = 0; i < 20; ++i) mapper.train({}, executor_);
+  for (int i = 0; i < 20; ++i) mapper.train({}, executor);
   add(mapper, at(5), stereo(at(5)));  // all of it is new
   int first = 0;
   mapper.gaussians().for_each([&](size_t i) { first += mapper.gaussians().anchor(i) == 0; });
@@ -111,9 +111,9 @@ TEST_F(PhotorealisticMapperTest, ASmallBudgetIsSpreadOverThePictureAndKeptByWhat
 TEST_F(PhotorealisticMapperTest, TrainingImprovesTheRender) {
   PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
   for (const double x : {0.0, 0.3, 0.6}) add(mapper, at(x), stereo(at(x)));
-  const auto first = mapper.train({}, executor_);
+  const auto first = mapper.train({}, executor);
   splatting::StepResult last{};
-  for (int i = 0; i < 150; ++i) last = mapper.train({}, executor_);
+  for (int i = 0; i < 150; ++i) last = mapper.train({}, executor);
   EXPECT_LT(last.mse, 0.5f * first.mse);
   EXPECT_EQ(mapper.num_iterations(), 151);
 }
@@ -138,7 +138,7 @@ TEST_F(PhotorealisticMapperTest, ColorsBecomeViewDependentOneDegreeAfterTheOther
   };
   const int expected[] = {0, 3, 8, 8};
   for (const int k : expected) {
-    for (int i = 0; i < 10; ++i) mapper.train({}, executor_);
+    for (int i = 0; i < 10; ++i) mapper.train({}, executor);
     EXPECT_EQ(highest(), k) << mapper.num_iterations() << " iterations";
   }
 }
@@ -161,7 +161,7 @@ TEST_F(PhotorealisticMapperTest, WhatNoPictureNeedsIsRemovedWhileFramesArrive) {
   const size_t before = mapper.gaussians().size();
   ASSERT_EQ(num_hidden(), 20);
   // A round has 200 iterations; in the first one the wall is still half transparent.
-  for (int i = 0; i < 400; ++i) mapper.train({}, executor_);
+  for (int i = 0; i < 400; ++i) mapper.train({}, executor);
   EXPECT_EQ(num_hidden(), 0);
   EXPECT_GT(mapper.gaussians().size(), before / 2) << "the wall stays";
 }
@@ -173,13 +173,13 @@ TEST_F(PhotorealisticMapperTest, ExposureIsToldFromColor) {
     PhotorealisticOptions options;
     options.exposure.enabled = enabled;
     PhotorealisticMapper mapper(options, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
-    world_ = testing::WallWithKeyframes(kCamera);
-    count_ = 0;
+    world = testing::WallWithKeyframes(kCamera);
+    num_added = 0;
     for (size_t i = 0; i < gains.size(); ++i) {
       const SE3 pose = at(0.15 * static_cast<double>(i));
       add(mapper, pose, stereo(pose), gains[i]);
     }
-    for (int i = 0; i < 300; ++i) mapper.train({}, executor_);
+    for (int i = 0; i < 300; ++i) mapper.train({}, executor);
     psnr[enabled] = mapper.training_psnr();
     const auto exposures = mapper.freeze().keyframe_exposures;
     for (size_t i = 0; i < gains.size(); ++i) {
@@ -204,7 +204,7 @@ TEST_F(PhotorealisticMapperTest, GaussiansFollowTheirKeyframe) {
   PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
   add(mapper, at(0), stereo(at(0)));
   const FrozenMap before = mapper.freeze();
-  MapSnapshot corrected = *world_.snapshot();
+  MapSnapshot corrected = *world.snapshot();
   auto moved = std::make_shared<KeyframeView>(corrected.keyframe(KeyframeId(0)));
   moved->keyframe.camera_from_world = SE3(so3_exp(Vec3(0.1, -0.2, 0.3)), Vec3(1, 2, 3));
   corrected.keyframes[0] = moved;
@@ -238,7 +238,7 @@ TEST_F(PhotorealisticMapperTest, ASimilarityOfMapAndCamerasLeavesEveryImageTheSa
   options.schedule.start_pixels = kCamera.width * kCamera.height / 16;
   PhotorealisticMapper mapper(options, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
   for (const double x : {0.0, 0.3, 0.6}) add(mapper, at(x), stereo(at(x)));
-  for (int i = 0; i < 60; ++i) mapper.train({}, executor_);
+  for (int i = 0; i < 60; ++i) mapper.train({}, executor);
   const FrozenMap before = mapper.freeze();
   const SE3 between(so3_exp(Vec3(0.05, -0.1, 0.2)), Vec3(-0.2, 0.1, 0.3));
   const std::vector<SE3> cameras{before.keyframes_from_world[0], before.keyframes_from_world[2], between};
@@ -250,13 +250,13 @@ TEST_F(PhotorealisticMapperTest, ASimilarityOfMapAndCamerasLeavesEveryImageTheSa
     for (int i = 0; i < 7; ++i) tangent[i] = random.uniform(-0.8, 0.8);
     const Sim3 move = Sim3::exp(tangent);
     total = move * total;
-    world_.apply({.new_world_from_old_world = {move, move, move}});
-    mapper.update_poses(*world_.snapshot());
-    mapper.update_poses(*world_.snapshot());  // once is enough
+    world.apply({.new_world_from_old_world = {move, move, move}});
+    mapper.update_poses(*world.snapshot());
+    mapper.update_poses(*world.snapshot());  // once is enough
     const FrozenMap after = mapper.freeze();
     for (const SE3& camera : cameras) {
       const SE3 moved = (Sim3(camera) * total.inverse()).rigid();
-      const auto a = render(before, camera, executor_), b = render(after, moved, executor_);
+      const auto a = render(before, camera, executor), b = render(after, moved, executor);
       // Rounding may carry a splat across the cut-off at alpha = 1/255, or past another that is equally far, which
       // shows in some pixels.
       size_t crossed = 0;
@@ -277,7 +277,7 @@ TEST_F(PhotorealisticMapperTest, ContinuesFromAnArchiveAsIfNothingHadHappened) {
   const MapperSensor sensor{.camera = kCamera, .stereo_baseline_m = kBaseline};
   PhotorealisticMapper mapper({}, sensor, 1);
   for (const double x : {0.0, 0.3}) add(mapper, at(x), stereo(at(x)));
-  for (int i = 0; i < 40; ++i) mapper.train({}, executor_);
+  for (int i = 0; i < 40; ++i) mapper.train({}, executor);
   Archive saved;
   mapper.serialize(saved);
 
@@ -289,13 +289,13 @@ TEST_F(PhotorealisticMapperTest, ContinuesFromAnArchiveAsIfNothingHadHappened) {
   loaded.serialize(saved_again);
   EXPECT_TRUE(saved_again.bytes() == saved.bytes());
   for (int i = 0; i < 30; ++i) {
-    ASSERT_EQ(mapper.train({}, executor_).loss, loaded.train({}, executor_).loss) << i;
+    ASSERT_EQ(mapper.train({}, executor).loss, loaded.train({}, executor).loss) << i;
   }
-  world_.add(at(0.6));
+  world.add(at(0.6));
   for (PhotorealisticMapper* m : {&mapper, &loaded}) {
     KeyframeImages images = stereo(at(0.6));
-    images.color = to_rgb(world_.picture(at(0.6)));
-    m->add_keyframe(*world_.snapshot(), KeyframeId(2), images, executor_);
+    images.color = to_rgb(world.picture(at(0.6)));
+    m->add_keyframe(*world.snapshot(), KeyframeId(2), images, executor);
   }
   EXPECT_EQ(mapper.gaussians().size(), loaded.gaussians().size());
 }
@@ -309,17 +309,17 @@ TEST_F(PhotorealisticMapperTest, ContinuesFromAnArchiveThroughCorrectionsAsIfNot
   const splatting::Exposure known{{0.5f, 0.6f, 0.7f}, {0, 0, 0}};
   PhotorealisticMapper mapper(options, sensor, 1);
   add(mapper, at(0), stereo(at(0)));
-  for (int i = 0; i < 40; ++i) mapper.train({}, executor_);
+  for (int i = 0; i < 40; ++i) mapper.train({}, executor);
   const auto correct = [&](double x) {
     const Sim3 stay, move(SE3(so3_exp(Vec3(0, 0.02, 0)), Vec3(x, 0, 0)));
     MapCorrection correction;
-    correction.new_world_from_old_world.assign(static_cast<size_t>(count_), move);
+    correction.new_world_from_old_world.assign(static_cast<size_t>(num_added), move);
     correction.new_world_from_old_world[0] = stay;
-    world_.apply(correction);
+    world.apply(correction);
   };
   for (const double x : {0.1, 0.2, 0.3, 0.6}) add(mapper, at(x), stereo(at(x)), 0.9, known);
   correct(0.05);
-  mapper.update_poses(*world_.snapshot());
+  mapper.update_poses(*world.snapshot());
   ASSERT_TRUE(mapper.has_seams());
 
   Archive saved;
@@ -328,17 +328,17 @@ TEST_F(PhotorealisticMapperTest, ContinuesFromAnArchiveThroughCorrectionsAsIfNot
   Archive reader(saved.bytes());
   loaded.serialize(reader);
   correct(-0.03);
-  world_.add(at(0.9));
+  world.add(at(0.9));
   KeyframeImages images = stereo(at(0.9));
-  images.color = to_rgb(world_.picture(at(0.9)));
+  images.color = to_rgb(world.picture(at(0.9)));
   std::vector<std::string> ends;
   for (PhotorealisticMapper* m : {&mapper, &loaded}) {
-    for (int i = 0; i < 8; ++i) m->train({}, executor_);
-    m->update_poses(*world_.snapshot());
-    for (int i = 0; i < 8; ++i) m->train({}, executor_);
-    m->add_keyframe(*world_.snapshot(), KeyframeId(5), images, executor_);
-    for (int i = 0; i < 12; ++i) m->train({}, executor_);
-    for (int i = 0; i < 5; ++i) m->train(0.1 * i, executor_);
+    for (int i = 0; i < 8; ++i) m->train({}, executor);
+    m->update_poses(*world.snapshot());
+    for (int i = 0; i < 8; ++i) m->train({}, executor);
+    m->add_keyframe(*world.snapshot(), KeyframeId(5), images, executor);
+    for (int i = 0; i < 12; ++i) m->train({}, executor);
+    for (int i = 0; i < 5; ++i) m->train(0.1 * i, executor);
     Archive end;
     m->serialize(end);
     ends.push_back(end.take_bytes());
@@ -354,8 +354,8 @@ TEST_F(PhotorealisticMapperTest, ThereAreNeverMoreGaussiansThanTheBudgetAllows) 
   PhotorealisticMapper mapper(options, sensor, 1), other(options, sensor, 2);
   add(mapper, at(0), stereo(at(0)));
   EXPECT_EQ(mapper.gaussians().size(), kBudget) << "as many cells would like to have one";
-  world_ = testing::WallWithKeyframes(kCamera);
-  count_ = 0;
+  world = testing::WallWithKeyframes(kCamera);
+  num_added = 0;
   add(other, at(0.3), stereo(at(0.3)));
   mapper.append(std::move(other));
   EXPECT_EQ(mapper.gaussians().size(), kBudget);
@@ -386,7 +386,7 @@ TEST_F(PhotorealisticMapperTest, ForgetsPicturesBeyondTheBudgetAndGoesOn) {
   PhotorealisticMapper mapper(options, sensor, 1);
   for (const double x : {0.0, 0.3, 0.31, 0.6, 0.61}) {
     add(mapper, at(x), stereo(at(x)));
-    for (int i = 0; i < 15; ++i) mapper.train({}, executor_);
+    for (int i = 0; i < 15; ++i) mapper.train({}, executor);
   }
   const FrozenMap map = mapper.freeze();
   EXPECT_EQ(map.keyframes_from_world.size(), 5u) << "a keyframe without pictures still carries gaussians";
@@ -398,20 +398,20 @@ TEST_F(PhotorealisticMapperTest, ForgetsPicturesBeyondTheBudgetAndGoesOn) {
   Archive reader(saved.bytes());
   loaded.serialize(reader);
   for (int i = 0; i < 40; ++i) {
-    ASSERT_EQ(mapper.train({}, executor_).loss, loaded.train({}, executor_).loss) << i;
+    ASSERT_EQ(mapper.train({}, executor).loss, loaded.train({}, executor).loss) << i;
   }
 }
 
 TEST_F(PhotorealisticMapperTest, AKeyframeWithoutPicturesIsAsBrightAsItsNeighbour) {
   PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
   add(mapper, at(0), stereo(at(0)));
-  for (int i = 0; i < 100; ++i) mapper.train({}, executor_);
+  for (int i = 0; i < 100; ++i) mapper.train({}, executor);
   for (const double x : {0.1, 0.2}) {
-    world_.add(at(x));
-    mapper.add_keyframe(*world_.snapshot(), KeyframeId(count_++), {}, executor_);
+    world.add(at(x));
+    mapper.add_keyframe(*world.snapshot(), KeyframeId(num_added++), {}, executor);
   }
   add(mapper, at(0.3), stereo(at(0.3)), 0.7);
-  for (int i = 0; i < 200; ++i) mapper.train({}, executor_);
+  for (int i = 0; i < 200; ++i) mapper.train({}, executor);
   const auto exposures = mapper.freeze().keyframe_exposures;
   EXPECT_NEAR(exposures[3].gain[1], 0.7f, 0.05f);
   EXPECT_EQ(exposures[1].gain[1], exposures[0].gain[1]);
@@ -421,8 +421,8 @@ TEST_F(PhotorealisticMapperTest, AKeyframeWithoutPicturesIsAsBrightAsItsNeighbou
 TEST_F(PhotorealisticMapperTest, AKeyframeWithoutPicturesIsAnAnchor) {
   PhotorealisticMapper mapper({}, {.camera = kCamera}, 1);
   const auto add_anchor = [&](double x) {
-    world_.add(at(x));
-    mapper.add_keyframe(*world_.snapshot(), KeyframeId(count_++), {}, executor_);
+    world.add(at(x));
+    mapper.add_keyframe(*world.snapshot(), KeyframeId(num_added++), {}, executor);
   };
   add_anchor(-0.3);
   EXPECT_FALSE(mapper.newest_with_pictures().has_value()) << "nothing to train on yet";
@@ -434,12 +434,12 @@ TEST_F(PhotorealisticMapperTest, AKeyframeWithoutPicturesIsAnAnchor) {
   EXPECT_GT(mapper.gaussians().size(), 800u) << "what the second picture is wanted for may come later";
   EXPECT_GT(share_on_the_wall(mapper, 0.08), 0.9);
   add_anchor(0.4);
-  const double before = mapper.train({}, executor_).mse;
+  const double before = mapper.train({}, executor).mse;
   double after = before;
-  for (int i = 0; i < 40; ++i) after = mapper.train({}, executor_).mse;
+  for (int i = 0; i < 40; ++i) after = mapper.train({}, executor).mse;
   EXPECT_LT(after, before);
   EXPECT_EQ(mapper.freeze().keyframes_from_world.size(), 5u);
-  EXPECT_EQ(mapper.compare(3, executor_).features.empty(), false) << "the newest picture's";
+  EXPECT_EQ(mapper.compare(3, executor).features.empty(), false) << "the newest picture's";
 
   Archive saved;
   mapper.serialize(saved);
@@ -447,15 +447,15 @@ TEST_F(PhotorealisticMapperTest, AKeyframeWithoutPicturesIsAnAnchor) {
   Archive reader(saved.bytes());
   loaded.serialize(reader);
   for (int i = 0; i < 20; ++i) {
-    ASSERT_EQ(mapper.train({}, executor_).loss, loaded.train({}, executor_).loss) << i;
+    ASSERT_EQ(mapper.train({}, executor).loss, loaded.train({}, executor).loss) << i;
   }
 }
 
 TEST_F(PhotorealisticMapperTest, ACulledKeyframeKeepsItsGaussiansUntilItsParentHasCome) {
   PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
   add(mapper, at(0), stereo(at(0)));
-  for (const double x : {0.3, 0.6}) world_.add(at(x));
-  MapSnapshot map = *world_.snapshot();
+  for (const double x : {0.3, 0.6}) world.add(at(x));
+  MapSnapshot map = *world.snapshot();
   auto culled = std::make_shared<KeyframeView>(map.keyframe(KeyframeId(0)));
   culled->keyframe.culled = true;
   culled->keyframe.parent = KeyframeId(2);  // the spanning tree was turned
@@ -467,27 +467,27 @@ TEST_F(PhotorealisticMapperTest, ACulledKeyframeKeepsItsGaussiansUntilItsParentH
   };
   const size_t before = of_first();
   ASSERT_GT(before, 0u);
-  mapper.add_keyframe(map, KeyframeId(1), {}, executor_);
+  mapper.add_keyframe(map, KeyframeId(1), {}, executor);
   mapper.update_poses(map);
   EXPECT_EQ(of_first(), before);
-  mapper.add_keyframe(map, KeyframeId(2), {}, executor_);
+  mapper.add_keyframe(map, KeyframeId(2), {}, executor);
   EXPECT_EQ(of_first(), 0u);
   EXPECT_EQ(mapper.gaussians().size(), before);
 }
 
 TEST_F(PhotorealisticMapperTest, AKeyframeThatCameTooLateIsAnAnchor) {
   PhotorealisticMapper mapper({}, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
-  for (const double x : {0.0, 0.3, 0.6}) world_.add(at(x));
-  MapSnapshot map = *world_.snapshot();
+  for (const double x : {0.0, 0.3, 0.6}) world.add(at(x));
+  MapSnapshot map = *world.snapshot();
   auto culled = std::make_shared<KeyframeView>(map.keyframe(KeyframeId(1)));
   culled->keyframe.culled = true;
   culled->keyframe.parent = KeyframeId(0);
   map.keyframes[1] = culled;
   for (int32_t k = 0; k < 3; ++k) {
     KeyframeImages images = stereo(at(0.3 * k));
-    images.color = to_rgb(world_.picture(at(0.3 * k)));
+    images.color = to_rgb(world.picture(at(0.3 * k)));
     const size_t before = mapper.gaussians().size();
-    mapper.add_keyframe(map, KeyframeId(k), images, executor_);
+    mapper.add_keyframe(map, KeyframeId(k), images, executor);
     EXPECT_EQ(mapper.gaussians().size() > before, k != 1) << k;
     EXPECT_EQ(mapper.newest_with_pictures(), k == 2 ? 2u : 0u);
   }
