@@ -18,22 +18,14 @@
 #include "photorealistic_mapping/photorealistic_mapper.h"
 #include "photorealistic_mapping/testing/wall_with_keyframes.h"
 #include "photorealistic_mapping/view_geometry.h"
-#include "splatting/cuda/engine.h"
-#include "splatting/cuda/host_device.h"
 #include "splatting/gpu.h"
+#include "splatting/testing/host_gpu.h"
 
 namespace photoslam {
 namespace {
 
-using splatting::cuda::HostDevice;
 using splatting::cuda::HostFaults;
-
-std::shared_ptr<splatting::Gpu> make_gpu(HostFaults* faults = nullptr) {
-  return std::make_shared<splatting::Gpu>(
-      std::make_unique<splatting::cuda::Engine<HostDevice>>(HostDevice(splatting::cuda::ThreadOrder::forwards, faults),
-                                                            uint64_t{1} << 30),
-      "host");
-}
+using splatting::testing::make_host_gpu;
 
 /// An RGB-D camera before the wall. Slow is what runs on the GPU: pictures are small.
 class Story {
@@ -124,7 +116,7 @@ class Compared {
   SerialExecutor executor_;
 
  public:
-  std::shared_ptr<splatting::Gpu> gpu = make_gpu();
+  std::shared_ptr<splatting::Gpu> gpu = make_host_gpu();
   PhotorealisticMapper remote;
 };
 
@@ -262,7 +254,7 @@ TEST(MapperOnGpu, WeighsOpacityAsOnTheCpu) {
   for (const double weight : {0.0, 20.0}) {
     PhotorealisticOptions options = test_options();
     options.opacity_weight = weight;
-    PhotorealisticMapper remote(options, story.sensor(), 1, make_gpu()), cpu(options, story.sensor(), 1);
+    PhotorealisticMapper remote(options, story.sensor(), 1, make_host_gpu()), cpu(options, story.sensor(), 1);
     if (weight == 0) story.next_keyframe(at(0));
     for (PhotorealisticMapper* mapper : {&remote, &cpu}) {
       mapper->add_keyframe(*story.map(), KeyframeId(0), story.look(at(0), 1.0), executor);
@@ -299,7 +291,7 @@ struct ShortRun {
     options.densification.split_size = split_size;
     options.depth_weight = 0.01;
     options.schedule.start_pixels = 24 * 18;
-    std::shared_ptr<splatting::Gpu> gpu = make_gpu(faults);
+    std::shared_ptr<splatting::Gpu> gpu = make_host_gpu(faults);
     PhotorealisticMapper mapper(options, story.sensor(), 1, gpu);
     for (const double x : {0.0, 0.4}) {
       story.next_keyframe(at(x));

@@ -8,20 +8,13 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
-#include "splatting/cuda/engine.h"
-#include "splatting/cuda/host_device.h"
+#include "splatting/testing/host_gpu.h"
 
 namespace photoslam {
 namespace {
 
-using splatting::cuda::HostDevice;
 using splatting::cuda::HostFaults;
-
-std::unique_ptr<splatting::Gpu> make_gpu(HostFaults* faults = nullptr) {
-  return std::make_unique<splatting::Gpu>(std::make_unique<splatting::cuda::Engine<HostDevice>>(
-                                              HostDevice(splatting::cuda::ThreadOrder::forwards, faults), 1u << 24),
-                                          "host");
-}
+using splatting::testing::make_host_gpu;
 
 SourceInfo distorted(SensorKind sensor) {
   SourceInfo info;
@@ -60,7 +53,7 @@ TEST(FrameRectifier, GivesTheSameBytesOnAGpu) {
   Random random(91);
   for (const SensorKind sensor : {SensorKind::mono, SensorKind::rgbd, SensorKind::stereo}) {
     const SourceInfo info = distorted(sensor);
-    const auto gpu = make_gpu();
+    const auto gpu = make_host_gpu();
     const double before = gpu->peak_mb();
     FrameRectifier on_gpu(info, gpu.get()), on_cpu(info);
     for (const int channels : {3, 1, 3}) {
@@ -80,7 +73,7 @@ TEST(FrameRectifier, GivesTheSameBytesOnAGpu) {
 TEST(FrameRectifier, TakesNothingOfAGpuWherePicturesFitAlready) {
   SourceInfo info = distorted(SensorKind::rgbd);
   info.distortion = {};
-  const auto gpu = make_gpu();
+  const auto gpu = make_host_gpu();
   const double before = gpu->peak_mb();
   FrameRectifier rectifier(info, gpu.get());
   Random random(92);
@@ -95,7 +88,7 @@ int rectify_with(const SourceInfo& info, std::function<bool()> HostFaults::* kin
   HostFaults faults;
   int calls = 0;
   faults.*kind = [&] { return calls++ == spoiled; };
-  const auto gpu = make_gpu(&faults);
+  const auto gpu = make_host_gpu(&faults);
   FrameRectifier on_gpu(info, gpu.get()), on_cpu(info);
   Random random(93);
   for (int i = 0; i < 3; ++i) {
