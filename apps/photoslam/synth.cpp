@@ -245,6 +245,10 @@ void add_synth(CommandLine& line) {
   command.add_option("--exposure-jumps", o.exposure_jumps, "Height of sudden changes of the exposure [EV]")
       ->check(CLI::Range(0.0, 4.0))
       ->capture_default_str();
+  command
+      .add_option("--reflections", o.reflections, "Share of what glossy surfaces mirror that is seen; 0: all is matt")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
   command.add_option("--lens", a.lens, "Distortion: none, radial (and tangential) or fisheye of 140°")
       ->check(CLI::IsMember({"none", "radial", "fisheye"}))
       ->capture_default_str();

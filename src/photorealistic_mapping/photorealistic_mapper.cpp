@@ -10,6 +10,7 @@
 #include "base/check.h"
 #include "image/convert.h"
 #include "math/median.h"
+#include "photorealistic_mapping/guesses.h"
 #include "photorealistic_mapping/handover.h"
 #include "photorealistic_mapping/seams.h"
 #include "photorealistic_mapping/view_geometry.h"
@@ -79,6 +80,9 @@ void PhotorealisticOptions::visit(OptionVisitor& v) {
       reseed_interval);
   v.value({"reseed_color_error", "", 0.0, 3.0, "Squared colour error above which old keyframes are seeded again."},
           reseed_color_error);
+  v.value({"guess_tolerance", "", 0.0, 1.0,
+           "Gaussians that borrowed their depth go when they lie this share before what is measured; 0: never."},
+          guess_tolerance);
   v.value({"image_budget_mb", "MB", 1.0, 1e6,
            "Pictures of keyframes beyond this are forgotten, those first that others resemble most."},
           image_budget_mb);
@@ -270,6 +274,9 @@ void PhotorealisticMapper::seed_keyframe(const MapSnapshot& map, size_t view, Ex
     if (is_wanted) sweep_picture(map, view, executor);
     views_[view].lacks_depth = is_wanted && picture.depth.empty();
   }
+  // show() has left the poses there.
+  const double tolerance = options_.guess_tolerance;
+  if (settle_guesses(picture, camera_from_anchor_, options_.near_m, tolerance, model_) > 0) show(view, executor);
   const Keyframe& keyframe = map.keyframe(KeyframeId(static_cast<int32_t>(view))).keyframe;
   newest_features_ = feature_depths(options_.feature_depth, map, keyframe, picture, kSeedingFactor);
   seed(view, {cell_size(options_.seeding), options_.seeding.min_color_error}, newest_features_);
@@ -335,17 +342,26 @@ void PhotorealisticMapper::show(size_t index, Executor& executor) {
 }
 
 void PhotorealisticMapper::seed(size_t index, const SeedingRound& round, std::span<const DepthPixel> features) {
-  TrainingView& view = views_[index];
-  const DepthPicture& picture = view.picture;
-  const splatting::Exposure exposure = view.exposure.exposure();
-  auto seeds = seed_cells(options_.seeding, picture, render_, round);
+  const DepthPicture& picture = views_[index].picture;
+  auto [measured, guessed] = seed_cells(options_.seeding, picture, render_, round);
   const auto at_features = seed_features(options_.seeding, picture, kSeedingFactor, render_, features);
-  seeds.insert(seeds.end(), at_features.begin(), at_features.end());
+  measured.insert(measured.end(), at_features.begin(), at_features.end());
   const auto limit = static_cast<size_t>(options_.densification.max_gaussians);
   // A picture may want more seeds than the budget has; they must not push out all that was learnt.
-  const size_t newcomers = std::min(seeds.size(), limit / 10);
-  if (options_.densification.relocation) make_room(options_.densification, newcomers, model_);
-  thin(seeds, limit - std::min(limit, model_.size()));
+  const size_t wanted = measured.size() + guessed.size();
+  if (options_.densification.relocation) make_room(options_.densification, std::min(wanted, limit / 10), model_);
+  const size_t room = limit - std::min(limit, model_.size());
+  if (wanted > room) {
+    thin(measured, room * measured.size() / wanted);
+    thin(guessed, room - measured.size());
+  }
+  add_seeds(index, measured, 0);
+  add_seeds(index, guessed, kGuessTag);
+}
+
+void PhotorealisticMapper::add_seeds(size_t index, std::span<splatting::Gaussian> seeds, uint32_t tag) {
+  const TrainingView& view = views_[index];
+  const splatting::Exposure exposure = view.exposure.exposure();
   // Seeds are made in the frame of the adjusted view; the anchor is the geometric keyframe.
   const SE3 anchor_from_view = view.adjustment.correction().inverse();
   const ShRotation rotation(anchor_from_view.matrix3());
@@ -353,7 +369,7 @@ void PhotorealisticMapper::seed(size_t index, const SeedingRound& round, std::sp
     if (options_.exposure.enabled) remove(exposure, g);
     g = transform(g, anchor_from_view, rotation);
   }
-  model_.add(static_cast<int>(index), seeds, 0, static_cast<uint32_t>(iteration_));
+  model_.add(static_cast<int>(index), seeds, tag, static_cast<uint32_t>(iteration_));
 }
 
 void PhotorealisticMapper::add_gaussians(std::span<const splatting::Gaussian> in_world) {

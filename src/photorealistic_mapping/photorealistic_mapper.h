@@ -46,6 +46,7 @@ struct PhotorealisticOptions {
   double near_m = 0.01;
   int reseed_interval = 25;
   double reseed_color_error = 0.03;
+  double guess_tolerance = 0.1;
   double image_budget_mb = 1000;
   bool handover = true;
   SeedingOptions seeding;
@@ -173,6 +174,8 @@ class PhotorealisticMapper {
   void show(size_t view, Executor& executor);
   /// What show() has drawn of the same view is what need not be seeded.
   void seed(size_t view, const SeedingRound& round, std::span<const DepthPixel> features);
+  /// As they come from the view's picture; their values are used up.
+  void add_seeds(size_t view, std::span<splatting::Gaussian> seeds, uint32_t tag);
   void render_picture(size_t view, Executor& executor);
   void maintain(std::optional<double> progress, Executor& executor);
 

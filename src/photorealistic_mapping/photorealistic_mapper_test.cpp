@@ -8,6 +8,7 @@
 
 #include "base/archive.h"
 #include "image/convert.h"
+#include "photorealistic_mapping/guesses.h"
 #include "photorealistic_mapping/testing/wall_with_keyframes.h"
 #include "photorealistic_mapping/view_geometry.h"
 
@@ -87,6 +88,26 @@ TEST_F(PhotorealisticMapperTest, DepthIsMeasuredOnlyForWhatTheMapDoesNotExplain)
   };
   const int measured = growth(0.02), features_only = growth(0.9);
   EXPECT_GT(measured, features_only + 100);
+}
+
+TEST_F(PhotorealisticMapperTest, WhatWasGuessedGoesWhenItIsMeasuredFartherAway) {
+  PhotorealisticMapper mapper({}, {.camera = kCamera, .metres_per_depth_unit = 0.001}, 1);
+  const auto depth = [](uint16_t left, uint16_t right) {
+    ImageU16 image(kCamera.width, kCamera.height);
+    for (int y = 0; y < kCamera.height; ++y) {
+      for (int x = 0; x < kCamera.width; ++x) image(x, y) = x < kCamera.width / 2 ? left : right;
+    }
+    return image;
+  };
+  const auto guesses = [&] {
+    int count = 0;
+    mapper.gaussians().for_each([&](size_t i) { count += mapper.gaussians().tag(i) == kGuessTag; });
+    return count;
+  };
+  add(mapper, at(0), {{}, depth(0, 2000), {}});
+  EXPECT_GT(guesses(), 300) << "half of the picture";
+  add(mapper, at(0.05), {{}, depth(4000, 4000), {}});
+  EXPECT_EQ(guesses(), 240 / 6) << "a column of cells has left the picture";
 }
 
 TEST_F(PhotorealisticMapperTest, ASmallBudgetIsSpreadOverThePictureAndKeptByWhatWasLearnt) {

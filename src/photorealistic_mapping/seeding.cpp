@@ -206,14 +206,14 @@ void SeedingOptions::visit(OptionVisitor& v) {
           feature_color_error);
 }
 
-std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const DepthPicture& view,
-                                            const splatting::RenderResult& render, const SeedingRound& round) {
+CellSeeds seed_cells(const SeedingOptions& options, const DepthPicture& view, const splatting::RenderResult& render,
+                     const SeedingRound& round) {
   if (!options.dense) return {};
   CellGrid grid = summarize(view, render, round.cell);
   if (round.fills_holes && view.depth.empty()) take_drawn_depth(options, grid);
   fill_missing_depth(grid);
 
-  std::vector<splatting::Gaussian> seeds;
+  CellSeeds seeds;
   for (int row = 0; row < grid.rows; ++row) {
     for (int column = 0; column < grid.columns; ++column) {
       const Cell& cell = grid.at(column, row);
@@ -222,8 +222,9 @@ std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const
       const bool wrong_color = cell.color_error > round.min_color_error;
       if (!uncovered && !(cell.measured && wrong_color)) continue;
       const double sigma = options.sigma_cells * round.cell * cell.depth / view.camera.fx;
-      seeds.push_back(make_disc(options, view.camera.unproject(cell.center(), cell.depth),
-                                surface_normal(grid, view.camera, column, row), sigma, cell.color));
+      (cell.measured ? seeds.measured : seeds.guessed)
+          .push_back(make_disc(options, view.camera.unproject(cell.center(), cell.depth),
+                               surface_normal(grid, view.camera, column, row), sigma, cell.color));
     }
   }
   return seeds;

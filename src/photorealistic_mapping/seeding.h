@@ -38,6 +38,12 @@ struct SeedingRound {
   bool fills_holes = false;
 };
 
+/// What cells have become.
+struct CellSeeds {
+  std::vector<splatting::Gaussian> measured;
+  std::vector<splatting::Gaussian> guessed;  ///< Their depth is borrowed.
+};
+
 /// New gaussians in the frame of the view's camera.
 ///
 /// A cell of the image becomes one gaussian, a disc on the measured surface as large as its cell, where `render` (of
@@ -45,8 +51,8 @@ struct SeedingRound {
 /// what is drawn is no reason: where it looks right, it is more often the measurement that is wrong.
 /// Cells without depth take the nearest measured one, of several the farthest, and only where the map is transparent.
 /// Cells without data in three quarters of their pixels are left out.
-std::vector<splatting::Gaussian> seed_cells(const SeedingOptions& options, const DepthPicture& view,
-                                            const splatting::RenderResult& render, const SeedingRound& round);
+CellSeeds seed_cells(const SeedingOptions& options, const DepthPicture& view, const splatting::RenderResult& render,
+                     const SeedingRound& round);
 
 /// Share of the cells with data that `render` leaves mostly transparent or shows in another colour.
 double unexplained_share(const SeedingOptions& options, const DepthPicture& view, const splatting::RenderResult& render,

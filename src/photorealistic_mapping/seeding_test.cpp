@@ -60,7 +60,7 @@ Mat3 axes_of(const splatting::Gaussian& g) {
 TEST(SeedCells, OneDiscPerCellOnTheMeasuredSurface) {
   const SeedingOptions options;
   Scene scene(2.0);
-  const auto seeds = seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error});
+  const auto seeds = seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error}).measured;
   ASSERT_EQ(seeds.size(), 16u * 12u);
   for (const auto& g : seeds) {
     EXPECT_NEAR(g.mean[2], 2.0, 1e-6);
@@ -83,7 +83,7 @@ TEST(SeedCells, NothingIsSeededWhereThereIsNoData) {
       for (int c = 0; c < 3; ++c) scene.view.color(x, y, c) = 0;
     }
   }
-  const auto seeds = seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error});
+  const auto seeds = seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error}).measured;
   ASSERT_EQ(seeds.size(), 12u * 12u);
   const double expected[3] = {0.2, 0.4, 0.8};
   for (const auto& g : seeds) {
@@ -97,7 +97,7 @@ TEST(SeedCells, TiltedSurfacesGetDiscsAlongThem) {
   const SeedingOptions options;
   const double slope = 0.4;
   Scene scene(2.0, slope);
-  const auto seeds = seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error});
+  const auto seeds = seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error}).measured;
   const Vec3 normal = Vec3(-slope, 0, 1).normalized();
   int checked = 0;
   for (const auto& g : seeds) {
@@ -114,7 +114,7 @@ TEST(SeedCells, WhatTheMapExplainsIsNotSeeded) {
   const SeedingOptions options;
   Scene scene(2.0);
   scene.render_exactly();
-  EXPECT_TRUE(seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error}).empty());
+  EXPECT_TRUE(seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error}).measured.empty());
   // A block of another colour; and one that is measured before the surface that is drawn, but looks like it.
   for (int y = 8; y < 12; ++y) {
     for (int x = 8; x < 12; ++x) {
@@ -122,7 +122,7 @@ TEST(SeedCells, WhatTheMapExplainsIsNotSeeded) {
       scene.view.depth(x + 16, y) = 1.5f;
     }
   }
-  const auto seeds = seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error});
+  const auto seeds = seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error}).measured;
   ASSERT_EQ(seeds.size(), 1u);
   EXPECT_NEAR(seeds[0].mean[2], 2.0, 1e-6);
 }
@@ -150,10 +150,14 @@ TEST(SeedCells, HolesTakeTheNearestDepthOnlyWhereNothingIsDrawn) {
   for (int y = 0; y < 48; ++y) {
     for (int x = 0; x < 32; ++x) scene.view.depth(x, y) = 0;
   }
-  EXPECT_EQ(seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error}).size(), 16u * 12u);
+  const auto [measured, guessed] = seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error});
+  EXPECT_EQ(measured.size(), 8u * 12u);
+  EXPECT_EQ(guessed.size(), 8u * 12u);
   scene.render_exactly();
   std::ranges::fill(scene.render.rgb, 0.0f);  // wrong colour everywhere
-  EXPECT_EQ(seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error}).size(), 8u * 12u);
+  const CellSeeds covered = seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error});
+  EXPECT_EQ(covered.measured.size(), 8u * 12u);
+  EXPECT_TRUE(covered.guessed.empty());
 }
 
 TEST(SeedCells, HolesOfAPictureWithoutDepthTakeWhatIsDrawnAround) {
@@ -168,8 +172,8 @@ TEST(SeedCells, HolesOfAPictureWithoutDepthTakeWhatIsDrawnAround) {
     }
   }
   std::fill_n(scene.render.rgb.begin(), 64 * 8, 0.0f);  // another colour is no hole
-  EXPECT_TRUE(seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error}).empty());
-  const auto seeds = seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error, true});
+  EXPECT_TRUE(seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error}).guessed.empty());
+  const auto seeds = seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error, true}).guessed;
   ASSERT_EQ(seeds.size(), 4u);
   for (const auto& g : seeds) EXPECT_NEAR(g.mean[2], 2, 1e-5);
 }
@@ -181,11 +185,13 @@ TEST(SeedCells, AHoleBetweenNearAndFarIsFar) {
     for (int x = 0; x < 64; ++x) scene.view.depth(x, y) = x < 6 * kCell ? 1.0f : x < 9 * kCell ? 0.0f : 5.0f;
   }
   std::map<int, float> depth_of_column;
-  for (const auto& g : seed_cells({}, scene.view, scene.render, {kCell, 0.1})) {
+  const auto [measured, guessed] = seed_cells({}, scene.view, scene.render, {kCell, 0.1});
+  EXPECT_EQ(measured.size(), (6u + 7u) * 12u);
+  for (const auto& g : guessed) {
     const double x = static_cast<double>(g.mean[0] / g.mean[2]) * scene.view.camera.fx + scene.view.camera.cx;
     depth_of_column[static_cast<int>(x) / kCell] = g.mean[2];
   }
-  EXPECT_NEAR(depth_of_column[5], 1, 1e-5);
+  EXPECT_EQ(depth_of_column.size(), 3u);
   EXPECT_NEAR(depth_of_column[6], 1, 1e-5) << "the tree is nearer to it";
   EXPECT_NEAR(depth_of_column[7], 5, 1e-5) << "as near to either";
   EXPECT_NEAR(depth_of_column[8], 5, 1e-5);
@@ -194,7 +200,8 @@ TEST(SeedCells, AHoleBetweenNearAndFarIsFar) {
 TEST(SeedCells, WithoutAnyDepthThereIsNothingToSeed) {
   Scene scene(2.0);
   scene.view.depth = ImageF(64, 48);
-  EXPECT_TRUE(seed_cells({}, scene.view, scene.render, {kCell, 0.1}).empty());
+  const auto [measured, guessed] = seed_cells({}, scene.view, scene.render, {kCell, 0.1});
+  EXPECT_TRUE(measured.empty() && guessed.empty());
 }
 
 TEST(SeedFeatures, BothDensificationsCanBeSwitchedOff) {
@@ -202,7 +209,7 @@ TEST(SeedFeatures, BothDensificationsCanBeSwitchedOff) {
   options.dense = false;
   options.inactive_features = false;
   Scene scene(2.0);
-  EXPECT_TRUE(seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error}).empty());
+  EXPECT_TRUE(seed_cells(options, scene.view, scene.render, {kCell, options.min_color_error}).measured.empty());
   const std::vector<DepthPixel> features = {{20.5f, 20.5f, 2.0f, true}, {80.5f, 60.5f, 2.0f, false}};
   EXPECT_EQ(seed_features(options, scene.view, 2, scene.render, features).size(), 1u) << "landmarks stay";
 }

@@ -137,6 +137,22 @@ TEST(SyntheticRig, MotionBlurIsTheMeanOverTheExposure) {
   EXPECT_LT(error, 0.4 * unblurred);
 }
 
+TEST(SyntheticRig, WithoutReflectionsASurfaceIsAtMostAsBright) {
+  SerialExecutor serial;
+  SyntheticOptions options = small(SensorKind::mono);
+  const SyntheticCamera camera(room(), options);
+  options.reflections = 0;
+  const SyntheticCamera matt(room(), options);
+  const SceneView with = camera.view(0, serial), without = matt.view(0, serial);
+  int brighter = 0;
+  for (size_t k = 0; k < with.radiance.values().size(); ++k) {
+    EXPECT_LE(without.radiance.values()[k], with.radiance.values()[k]);
+    brighter += with.radiance.values()[k] > without.radiance.values()[k] + 1e-3f;
+  }
+  EXPECT_GT(brighter, 100) << "the floor, and the glass of the pictures";
+  EXPECT_EQ(without.depth.values().front(), with.depth.values().front());
+}
+
 TEST(SyntheticRig, ExposureJumpsAndStays) {
   SerialExecutor serial;
   SyntheticOptions options = small(SensorKind::mono);

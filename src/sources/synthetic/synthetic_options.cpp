@@ -25,6 +25,8 @@ void SyntheticOptions::visit(OptionVisitor& visitor) {
   visitor.value({"exposure_drift", "EV", 0, 4, "Largest slow change of the exposure."}, exposure_drift);
   visitor.value({"exposure_jumps", "EV", 0, 4, "Height of sudden changes of the exposure, one every 1.5 s."},
                 exposure_jumps);
+  visitor.value({"reflections", "", 0, 1, "Share of what glossy surfaces mirror that is seen; 0: all is matt."},
+                reflections);
   visitor.value({"shutter_s", "s", 0, 0.1, "Time the shutter is open: motion blur."}, shutter_s);
   visitor.value({"readout_s", "s", 0, 0.1, "Time from the first to the last row: rolling shutter."}, readout_s);
   visitor.value({"baseline_m", "m", 0.01, 10, "Distance of the two cameras of a stereo rig."}, baseline_m);

@@ -21,6 +21,7 @@ struct SyntheticOptions {
   double depth_holes = 0.5;     ///< Share of the pixels at depth edges and grazing surfaces without a measurement.
   double exposure_drift = 0;    ///< Largest slow change of the exposure [EV, factors of two].
   double exposure_jumps = 0;    ///< Height of sudden changes of the exposure, one every 1.5 s [EV].
+  double reflections = 1;       ///< Share of what glossy surfaces mirror that is seen; 0: everything is matt.
   double shutter_s = 0;         ///< Time the shutter is open [s]: motion blur.
   double readout_s = 0;         ///< Time from the first to the last row [s]: rolling shutter.
   SensorKind sensor = SensorKind::rgbd;

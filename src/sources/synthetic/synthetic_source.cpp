@@ -55,15 +55,16 @@ SceneView SyntheticCamera::film(int index, const CameraRays& rays, const SE3& le
                                 Executor& executor) const {
   const double middle = static_cast<double>(timestamp_ns(index)) * 1e-9;
   const int height = options_.camera.height;
+  const float reflections = static_cast<float>(options_.reflections);
   const auto pose = [&](int row, double moment) {
     const double delay = options_.readout_s * ((row + 0.5) / height - 0.5) + options_.shutter_s * (moment - 0.5);
     return path_->world_from_camera(std::max(0.0, middle + delay)) * left_from_camera;
   };
   if (options_.shutter_s > 0 || options_.readout_s > 0) {
-    return world_->render({rays, pose, options_.shutter_s > 0}, executor);
+    return world_->render({rays, pose, options_.shutter_s > 0, reflections}, executor);
   }
   const SE3 still = world_from_camera(index) * left_from_camera;
-  return world_->render({rays, [&still](int, double) { return still; }}, executor);
+  return world_->render({rays, [&still](int, double) { return still; }, false, reflections}, executor);
 }
 
 SceneView SyntheticCamera::view(int index, Executor& executor) const { return film(index, rays_, SE3{}, executor); }

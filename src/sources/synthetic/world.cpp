@@ -75,7 +75,8 @@ struct SyntheticWorld::State {
 
   void render_colors(const Shot& shot, int y, SceneView& view) const;
   void measure_geometry(const Eye& eye, int y, SceneView& view) const;
-  Color shade(const RayTracer::Hits& hits, int ray, const Vec3f& origin, const Vec3f& direction, float focal) const;
+  Color shade(const RayTracer::Hits& hits, int ray, const Vec3f& origin, const Vec3f& direction, float focal,
+              float reflections) const;
   Color mirrored_light(const Vec3f& position, const Vec3f& reflected, float roughness, float visible) const;
   Color outside(const Vec3f& origin, const Vec3f& direction) const;
 };
@@ -113,7 +114,7 @@ Color SyntheticWorld::State::mirrored_light(const Vec3f& position, const Vec3f& 
 }
 
 Color SyntheticWorld::State::shade(const RayTracer::Hits& hits, int ray, const Vec3f& origin, const Vec3f& direction,
-                                   float focal) const {
+                                   float focal, float reflections) const {
   const size_t k = static_cast<size_t>(ray);
   if (hits.triangle[k] < 0) return outside(origin, direction);
   const synthetic::Mesh::Hit hit = model.mesh.hit(hits.triangle[k], hits.u[k], hits.v[k]);
@@ -136,10 +137,10 @@ Color SyntheticWorld::State::shade(const RayTracer::Hits& hits, int ray, const V
   const Color incoming = light.sample(hit.patch, hit.uv);
   Color out = albedo * (incoming + hit.material.emission);
   const float gloss = hit.material.gloss * albedo[3];
-  if (gloss > 0.004f) {
+  if (gloss > 0.004f && reflections > 0) {
     const Vec3f position = origin + hits.distance[k] * direction;
     const Vec3f reflected = 2 * normal.dot(view) * normal - view;
-    const float reflectance = fresnel(gloss, cosine) * (1 - hit.material.roughness);
+    const float reflectance = reflections * fresnel(gloss, cosine) * (1 - hit.material.roughness);
     // Apart from the window, a surface mirrors about as much light as falls on it.
     out += reflectance * (0.8f * incoming + mirrored_light(position, reflected, hit.material.roughness, incoming[3]));
   }
@@ -168,7 +169,7 @@ void SyntheticWorld::State::render_colors(const Shot& shot, int y, SceneView& vi
         if (!rays.exists(i)) continue;
         // Lights do not bleed over the edges of what stands before them.
         sums[static_cast<size_t>(x0 + i / samples)] +=
-            shade(hits, i, rays.origin, rays.direction(i), focal).min(3.0f / kExposure);
+            shade(hits, i, rays.origin, rays.direction(i), focal, shot.reflections).min(3.0f / kExposure);
       }
     }
   }

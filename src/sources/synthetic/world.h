@@ -28,6 +28,7 @@ struct Shot {
   /// Pose while row `row` is exposed; `moment` runs from 0 (shutter opens) to 1 (it closes).
   std::function<SE3(int row, double moment)> world_from_camera;
   bool moves_in_exposure = false;  ///< Whether the pose depends on the moment.
+  float reflections = 1;           ///< Share of the light mirrored by glossy surfaces that reaches the camera.
 };
 
 /// A ray-traced place to film, with exact depth.
