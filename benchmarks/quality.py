@@ -26,6 +26,7 @@ SWITCHES = {
     "no dense seeding": ["seeding.dense=false", "reseed_interval=0"],
     "no seeds at inactive features": ["seeding.inactive_features=false"],
     "no seeding again": ["reseed_interval=0"],
+    "wrong guesses stay": ["guess_tolerance=0"],
     "no exposure": ["exposure.enabled=false"],
     "depth loss": ["depth_weight=0.1"],
     "opacity regularisation": ["opacity_weight=0.01"],

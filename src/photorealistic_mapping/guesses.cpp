@@ -4,21 +4,14 @@
 
 #include <cmath>
 
+#include "photorealistic_mapping/view_geometry.h"
+
 namespace photoslam {
 namespace {
 
-Vec3 in_camera(const splatting::Pose& camera_from_anchor, const float (&mean)[3]) {
-  Vec3 p;
-  for (int row = 0; row < 3; ++row) {
-    p[row] = camera_from_anchor.translation[row];
-    for (int i = 0; i < 3; ++i) p[row] += camera_from_anchor.rotation[3 * row + i] * static_cast<double>(mean[i]);
-  }
-  return p;
-}
-
 /// Measured depth of the pixel that shows the point [m]; 0 = none.
-double depth_at(const DepthPicture& view, const Vec3& in_camera) {
-  const Vec2 pixel = view.camera.project(in_camera);
+double depth_at(const DepthPicture& view, const Vec3& point) {
+  const Vec2 pixel = view.camera.project(point);
   if (!view.camera.contains(pixel)) return 0;
   return static_cast<double>(
       view.depth(static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y()))));
@@ -31,7 +24,7 @@ size_t settle_guesses(const DepthPicture& view, std::span<const splatting::Pose>
   if (view.depth.empty() || tolerance <= 0) return 0;
   return model.remove_if([&](size_t i) {
     if (model.tag(i) != kGuessTag) return false;
-    const Vec3 p = in_camera(camera_from_anchor[static_cast<size_t>(model.anchor(i))], model.get(i).mean);
+    const Vec3 p = in_camera(camera_from_anchor[static_cast<size_t>(model.anchor(i))], model.get(i));
     if (!(p.z() > near_m)) return false;
     const double depth = depth_at(view, p);
     if (!(depth > 0) || p.z() > (1 + tolerance) * depth) return false;

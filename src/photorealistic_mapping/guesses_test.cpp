@@ -6,11 +6,13 @@
 
 #include <vector>
 
+#include "math/se3.h"
+
 namespace photoslam {
 namespace {
 
-/// A wall 2 m before the second of two cameras, which stands 1 m to the right of the first; its depth is measured in
-/// the left half of the picture.
+/// A wall 2 m before a camera that stands 1 m to the right of the second of two anchors and looks half a radian farther
+/// to the left; its depth is measured in the left half of the picture.
 class Guesses : public ::testing::Test {
  protected:
   Guesses() {
@@ -20,21 +22,22 @@ class Guesses : public ::testing::Test {
       for (int x = 0; x < 32; ++x) view.depth(x, y) = 2.0f;
     }
     for (int i = 0; i < 2; ++i) model.add_anchor();
-    camera_from_anchor[0].translation[0] = -1;
+    const Mat3 rotation = camera_from_second.matrix3();
+    for (int i = 0; i < 9; ++i) camera_from_anchor[1].rotation[i] = rotation(i / 3, i % 3);
+    for (int i = 0; i < 3; ++i) camera_from_anchor[1].translation[i] = camera_from_second.translation[i];
   }
 
-  /// Of the first camera, at a pixel of the second and so far before it.
+  /// Of the second anchor, at a pixel of the camera and so far before it.
   size_t add(double x, double y, double depth, uint32_t tag = kGuessTag) {
-    const Vec3 p = view.camera.unproject(Vec2(x, y), depth);
+    const Vec3 p = camera_from_second.inverse() * view.camera.unproject(Vec2(x, y), depth);
     splatting::Gaussian g;
-    g.mean[0] = static_cast<float>(p.x() + 1);
-    g.mean[1] = static_cast<float>(p.y());
-    g.mean[2] = static_cast<float>(p.z());
-    return model.add(0, {&g, 1}, tag).front();
+    for (int i = 0; i < 3; ++i) g.mean[i] = static_cast<float>(p[i]);
+    return model.add(1, {&g, 1}, tag).front();
   }
   size_t settle(double tolerance = 0.1) { return settle_guesses(view, camera_from_anchor, 0.1, tolerance, model); }
 
   DepthPicture view;
+  SE3 camera_from_second{Quat(so3_exp(Vec3(0, 0.5, 0))), Vec3(-1, 0, 0)};
   std::vector<splatting::Pose> camera_from_anchor{2};
   splatting::GaussianModel model;
 };

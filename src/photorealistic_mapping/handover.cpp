@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "map/map_spacing.h"
+#include "photorealistic_mapping/view_geometry.h"
 #include "photorealistic_mapping/world_export.h"
 
 namespace photoslam {
@@ -41,10 +42,7 @@ void LastViewers::show(int keyframe, const PinholeCamera& camera, std::span<cons
                        const splatting::RenderResult& render) {
   constexpr double kMinAlpha = 0.3, kBehind = 1.05;  // of the depth that is rendered
   model_.for_each([&](size_t i) {
-    const splatting::Pose& pose = camera_from_anchor[static_cast<size_t>(model_.anchor(i))];
-    const Vec3 p =
-        Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(pose.rotation) * mean_of(model_.get(i)) +
-        Eigen::Map<const Vec3>(pose.translation);
+    const Vec3 p = in_camera(camera_from_anchor[static_cast<size_t>(model_.anchor(i))], model_.get(i));
     constexpr double kElsewhere = kMapSpacing / 2;  // beyond is another map, whatever the picture shows of it
     if (!(p.z() > 0 && p.z() < kElsewhere)) return;
     const Vec2 pixel = camera.project(p);

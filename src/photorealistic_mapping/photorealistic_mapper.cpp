@@ -274,9 +274,7 @@ void PhotorealisticMapper::seed_keyframe(const MapSnapshot& map, size_t view, Ex
     if (is_wanted) sweep_picture(map, view, executor);
     views_[view].lacks_depth = is_wanted && picture.depth.empty();
   }
-  // show() has left the poses there.
-  const double tolerance = options_.guess_tolerance;
-  if (settle_guesses(picture, camera_from_anchor_, options_.near_m, tolerance, model_) > 0) show(view, executor);
+  settle_guesses_in(view, executor);
   const Keyframe& keyframe = map.keyframe(KeyframeId(static_cast<int32_t>(view))).keyframe;
   newest_features_ = feature_depths(options_.feature_depth, map, keyframe, picture, kSeedingFactor);
   seed(view, {cell_size(options_.seeding), options_.seeding.min_color_error}, newest_features_);
@@ -331,7 +329,8 @@ void PhotorealisticMapper::render_picture(size_t index, Executor& executor) {
   renderer_.render(model_, {camera, camera_from_anchor_}, render_options(kSeedingFactor), executor, render_);
 }
 
-/// The map as the view's small picture shows it, as bright as the picture.
+/// The map as the view's small picture shows it, as bright as the picture; for a view that was not trained yet that is
+/// found out by comparing the two.
 void PhotorealisticMapper::show(size_t index, Executor& executor) {
   TrainingView& view = views_[index];
   render_picture(index, executor);
@@ -339,6 +338,13 @@ void PhotorealisticMapper::show(size_t index, Executor& executor) {
   const bool unused = schedule_.uses(static_cast<int>(index)) == 0;
   if (index > 0 && unused && !view.exposure_is_known) view.exposure.match(view.picture, render_);
   apply(view.exposure.exposure(), render_);
+}
+
+void PhotorealisticMapper::settle_guesses_in(size_t index, Executor& executor) {
+  const TrainingView& view = views_[index];
+  if (settle_guesses(view.picture, camera_from_anchor_, options_.near_m, options_.guess_tolerance, model_) == 0) return;
+  render_picture(index, executor);
+  if (options_.exposure.enabled) apply(view.exposure.exposure(), render_);
 }
 
 void PhotorealisticMapper::seed(size_t index, const SeedingRound& round, std::span<const DepthPixel> features) {

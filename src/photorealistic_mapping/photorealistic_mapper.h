@@ -172,6 +172,8 @@ class PhotorealisticMapper {
   void seed_keyframe(const MapSnapshot& map, size_t view, Executor& executor);
   void sweep_picture(const MapSnapshot& map, size_t view, Executor& executor);
   void show(size_t view, Executor& executor);
+  /// Of the view that show() has just drawn, which is drawn again where one went.
+  void settle_guesses_in(size_t view, Executor& executor);
   /// What show() has drawn of the same view is what need not be seeded.
   void seed(size_t view, const SeedingRound& round, std::span<const DepthPixel> features);
   /// As they come from the view's picture; their values are used up.

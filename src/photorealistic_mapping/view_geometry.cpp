@@ -35,4 +35,11 @@ void camera_from_anchors(const SE3& camera_from_world, std::span<const SE3> anch
   }
 }
 
+Vec3 in_camera(const splatting::Pose& camera_from_anchor, const splatting::Gaussian& gaussian) {
+  const Vec3 mean(static_cast<double>(gaussian.mean[0]), static_cast<double>(gaussian.mean[1]),
+                  static_cast<double>(gaussian.mean[2]));
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(camera_from_anchor.rotation) * mean +
+         Eigen::Map<const Vec3>(camera_from_anchor.translation);
+}
+
 }  // namespace photoslam

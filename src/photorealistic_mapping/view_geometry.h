@@ -8,6 +8,7 @@
 #include "camera/pinhole.h"
 #include "image/image.h"
 #include "math/se3.h"
+#include "splatting/gaussian.h"
 #include "splatting/renderer.h"
 #include "splatting/view.h"
 
@@ -23,5 +24,8 @@ ImageF to_image(const splatting::RenderResult& render);
 /// the origin. Writes [anchors] poses.
 void camera_from_anchors(const SE3& camera_from_world, std::span<const SE3> anchors_from_world,
                          std::vector<splatting::Pose>& camera_from_anchor);
+
+/// Where a gaussian is, in the frame of the camera.
+Vec3 in_camera(const splatting::Pose& camera_from_anchor, const splatting::Gaussian& gaussian);
 
 }  // namespace photoslam

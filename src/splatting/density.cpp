@@ -42,12 +42,14 @@ void GaussianModel::breed(std::span<const Fate> fates, std::span<const double> n
   }
   struct Siblings {
     std::vector<Gaussian> gaussians;  // as their parents are
+    std::vector<uint32_t> tags;
     std::vector<size_t> numbers;
   };
   std::map<int, Siblings> of_anchor;
   for (size_t k = 0; k < children.size(); ++k) {
     Siblings& siblings = of_anchor[anchor(children[k].parent)];
     siblings.gaussians.push_back(read(children[k].parent));
+    siblings.tags.push_back(tag(children[k].parent));
     siblings.numbers.push_back(k);
   }
   remove(leaves);
@@ -56,6 +58,7 @@ void GaussianModel::breed(std::span<const Fate> fates, std::span<const double> n
     for (size_t i = 0; i < indices.size(); ++i) {
       const size_t number = siblings.numbers[i], lane = indices[i] % kBlockSize;
       Block& block = *blocks_[indices[i] / kBlockSize];
+      block.tags[lane] = siblings.tags[i];
       if (children[number].is_half != 0) halve(children[number].normals, &block.parameters[0][lane], kBlockSize);
       if (first_slot) block.origins[lane] = static_cast<uint32_t>(*first_slot + number + 1);
     }

@@ -58,7 +58,7 @@ TEST(Density, ChildrenStayWithTheAnchorOfTheirParentInOrder) {
     for (int i = 0; i < 3; ++i) {
       Gaussian g;
       g.sh[0][0] = static_cast<float>(10 * anchor + i);
-      model.add(anchor, {&g, 1}, 77);
+      model.add(anchor, {&g, 1}, static_cast<uint32_t>(70 + 10 * anchor + i));
     }
   }
   std::vector<Fate> fates(model.index_end(), Fate::stays);
@@ -74,7 +74,7 @@ TEST(Density, ChildrenStayWithTheAnchorOfTheirParentInOrder) {
     tags.push_back(model.tag(i));
   });
   EXPECT_EQ(colors, (std::vector<float>{0, 2, 0, 1, 1, 11, 12, 12}));
-  EXPECT_EQ(tags, (std::vector<uint32_t>{77, 77, 0, 0, 0, 77, 77, 0}));
+  EXPECT_EQ(tags, (std::vector<uint32_t>{70, 72, 70, 71, 71, 81, 82, 82}));
   EXPECT_EQ(model.size(0), 5u);
 }
 

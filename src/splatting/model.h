@@ -109,7 +109,7 @@ class GaussianModel {
   int add_anchor();
   int num_anchors() const { return static_cast<int>(blocks_of_anchor_.size()); }
 
-  /// Appends gaussians to an anchor. `tag` is free for the caller (a landmark id), `birth` likewise (an iteration).
+  /// Appends gaussians to an anchor. `tag` is free for the caller, `birth` likewise (an iteration).
   /// The optimiser state and the statistics of the newcomers are zero. Returns the index of each newcomer.
   std::vector<size_t> add(int anchor, std::span<const Gaussian> gaussians, uint32_t tag = 0, uint32_t birth = 0);
 
@@ -166,7 +166,7 @@ class GaussianModel {
 
   /// What the rules say of each gaussian: [index_end()].
   std::vector<Fate> judge(const DensityRules& rules) const;
-  /// Lets it happen. Clones and halves go to the anchor of their parent, in order of the parents, with neither tag nor
+  /// Lets it happen. Clones and halves go to the anchor of their parent, in order of the parents, with its tag but no
   /// past; the parent of two halves goes. `normals` holds six standard normal numbers per split. All indices change.
   void breed(std::span<const Fate> fates, std::span<const double> normals);
 
