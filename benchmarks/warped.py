@@ -3,12 +3,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """How well the beginning of a sequence foretells its later pictures: a yardstick for benchmarks/second_lap.py.
 
-Usage: benchmarks/warped.py SEQUENCE [--until 10] [--every 3] [--later-every 20]        (needs numpy and Pillow)
+Usage: benchmarks/warped.py SEQUENCE [--until 10] [--every 3] [--later-every 20] [--sources 4]
+
+Needs numpy and Pillow.
 
 There is no map here. Each pixel of a later picture takes its colour from the first pictures themselves: by measured
-depth and true poses it is found in those that see its surface (depths within 3 %), and is the mean of the four that see
-it from nearest by. SEQUENCE has the layout of TUM without distortion; --every and --later-every thin the pictures.
-Prints the PSNR of every later picture of which at least half was seen, and the mean.
+depth and true poses it is found in those that see its surface (depths within 3 %), and is the mean of the four that are
+nearest to it. SEQUENCE was made by `photoslam synth` without distortion: row i of its lists is frame i. --every and
+--later-every thin the pictures, --sources tells how many are averaged. Prints the PSNR of every later picture of which at
+least half was seen, and the mean.
 """
 import argparse
 import pathlib
@@ -16,7 +19,7 @@ import pathlib
 import numpy as np
 from PIL import Image
 
-MIN_SHARE, TOLERANCE, SOURCES = 0.5, 0.03, 4
+MIN_SHARE, TOLERANCE = 0.5, 0.03
 
 
 class Sequence:
@@ -65,10 +68,10 @@ def bilinear(image: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         (1 - fx) * image[y + 1, x] + fx * image[y + 1, x + 1])
 
 
-def warped(sequence: Sequence, points: np.ndarray, sources: list[tuple]) -> tuple[np.ndarray, np.ndarray]:
+def warped(sequence: Sequence, points: np.ndarray, sources: list[tuple], count: int) -> tuple[np.ndarray, np.ndarray]:
     """Colours of the points, and in how many of the nearest pictures each was seen."""
-    nearest = np.full((SOURCES, len(points)), np.inf)
-    colors = np.zeros((SOURCES, len(points), 3), np.float32)
+    nearest = np.full((count, len(points)), np.inf)
+    colors = np.zeros((count, len(points), 3), np.float32)
     for (rotation, position), image, depth in sources:
         p = (points - position) @ rotation
         z = np.maximum(p[:, 2], 1e-6)
@@ -78,15 +81,15 @@ def warped(sequence: Sequence, points: np.ndarray, sources: list[tuple]) -> tupl
         measured = depth[np.rint(v[k]).astype(int), np.rint(u[k]).astype(int)]
         k = k[np.abs(measured - z[k]) < TOLERANCE * z[k]]
         distance, color = z[k], bilinear(image, u[k], v[k])
-        for rank in range(SOURCES):  # insertion into the sorted list of each point
+        for rank in range(count):  # insertion into the sorted list of each point
             nearer = distance < nearest[rank, k]
             displaced, its_color = nearest[rank, k].copy(), colors[rank, k].copy()
             nearest[rank, k] = np.where(nearer, distance, displaced)
             colors[rank, k] = np.where(nearer[:, None], color, its_color)
             distance, color = np.where(nearer, displaced, distance), np.where(nearer[:, None], its_color, color)
     found = np.isfinite(nearest)
-    count = found.sum(0)
-    return (colors * found[..., None]).sum(0) / np.maximum(count, 1)[:, None], count
+    seen = found.sum(0)
+    return (colors * found[..., None]).sum(0) / np.maximum(seen, 1)[:, None], seen
 
 
 def main() -> None:
@@ -95,14 +98,15 @@ def main() -> None:
     parser.add_argument("--until", type=float, default=10.0)
     parser.add_argument("--every", type=int, default=3)
     parser.add_argument("--later-every", type=int, default=20)
+    parser.add_argument("--sources", type=int, default=4)
     a = parser.parse_args()
     sequence = Sequence(a.sequence)
     first = sum(time <= sequence.times[0] + a.until for time in sequence.times)
     sources = [(sequence.poses[i], sequence.color(i), sequence.depth(i)) for i in range(0, first, a.every)]
     scores = []
     for i in range(first, len(sequence.times), a.later_every):
-        color, count = warped(sequence, sequence.points(i), sources)
-        seen = (count > 0) & (sequence.depth(i).ravel() > 0)
+        color, found = warped(sequence, sequence.points(i), sources, a.sources)
+        seen = (found > 0) & (sequence.depth(i).ravel() > 0)
         if seen.mean() < MIN_SHARE:
             continue
         error = ((color - sequence.color(i).reshape(-1, 3)) ** 2)[seen].mean()
