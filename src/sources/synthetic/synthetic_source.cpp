@@ -64,7 +64,7 @@ SceneView SyntheticCamera::film(int index, const CameraRays& rays, const SE3& le
     return world_->render({rays, pose, options_.shutter_s > 0, reflections}, executor);
   }
   const SE3 still = world_from_camera(index) * left_from_camera;
-  return world_->render({rays, [&still](int, double) { return still; }, false, reflections}, executor);
+  return world_->render({rays, [&still](int, double) -> const SE3& { return still; }, false, reflections}, executor);
 }
 
 SceneView SyntheticCamera::view(int index, Executor& executor) const { return film(index, rays_, SE3{}, executor); }
