@@ -11,8 +11,8 @@
 
 namespace photoslam {
 
-/// Marks gaussians of cells whose depth is borrowed from beside them, until a measurement settles it. Those at features,
-/// whose depth may be interpolated, are not marked.
+/// Marks gaussians of cells whose depth is borrowed from beside them, until a measurement settles it. Those at
+/// features, whose depth may be interpolated, are not marked.
 inline constexpr uint32_t kGuessTag = 1;
 
 /// Holds the guesses in a view against its measured depth. Those that lie before the surface by more than `tolerance`
