@@ -10,16 +10,16 @@ void FrameAlignment::project_landmarks(const SE3& camera_from_world, const MapSn
                                        const std::vector<KeyframeId>& keyframes, float radius_px,
                                        const FrameMatches& matches) {
   projector_.clear();
-  std::vector<uint8_t> seen(static_cast<size_t>(map.num_landmarks), 0);
+  std::vector<bool> seen(static_cast<size_t>(map.num_landmarks));  // a bit each: most are long dead
   for (size_t i = 0; i < matches.matched.size(); ++i) {
     LandmarkId id = matches.point[i].landmark;
-    if (matches.matched[i] && map.find(id) != nullptr) seen[static_cast<size_t>(id.value)] = 1;
+    if (matches.matched[i] && map.find(id) != nullptr) seen[static_cast<size_t>(id.value)] = true;
   }
   for (const KeyframeId keyframe : keyframes) {
     for (LandmarkId id : map.keyframe(keyframe).keyframe.landmarks) {
       const LandmarkView* view = map.find(id);
       if (view == nullptr || seen[static_cast<size_t>(id.value)]) continue;
-      seen[static_cast<size_t>(id.value)] = 1;
+      seen[static_cast<size_t>(id.value)] = true;
       projector_.add(camera_from_world, id, *view, radius_px);
     }
   }

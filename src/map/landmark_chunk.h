@@ -27,6 +27,8 @@ class LandmarkChunk {
   /// The landmark has died; another one has taken over its observations.
   void replace(int slot, LandmarkId by) { replaced_.emplace_back(slot, by); }
 
+  bool empty() const { return views_.empty() && replaced_.empty(); }
+
   /// nullptr: dead.
   const LandmarkView* find(int slot) const {
     const uint64_t bits = alive_[word(slot)];

@@ -49,27 +49,30 @@ Keyframe& Map::mutable_keyframe(KeyframeId id) {
 
 const Landmark& Map::landmark(LandmarkId id) const {
   static const Landmark kDead;
-  const LandmarkSlot& slot = landmarks_[static_cast<size_t>(id.value)];
-  return slot.living ? *slot.living : kDead;
+  const Landmark* living = landmarks_.find(id);
+  return living != nullptr ? *living : kDead;
 }
 
 LandmarkId Map::living(LandmarkId id) const {
-  while (id.valid() && !landmarks_[static_cast<size_t>(id.value)].living) {
-    id = landmarks_[static_cast<size_t>(id.value)].replaced_by;
-  }
+  while (id.valid() && landmarks_.find(id) == nullptr) id = landmarks_.replacement(id);
   return id;
 }
 
 /// nullptr: it is dead.
 Landmark* Map::mutable_landmark(LandmarkId id) {
   PHOTOSLAM_CHECK(id.valid() && static_cast<size_t>(id.value) < landmarks_.size(), "landmark {}", id.value);
-  changed_chunks_.insert(id.value / LandmarkChunk::kSize);
-  return landmarks_[static_cast<size_t>(id.value)].living.get();
+  has_changed(id);
+  return landmarks_.find(id);
 }
 
-void Map::bury(LandmarkId id, LandmarkId replaced_by) {
-  changed_chunks_.insert(id.value / LandmarkChunk::kSize);
-  landmarks_[static_cast<size_t>(id.value)] = {nullptr, replaced_by};
+void Map::bury(LandmarkId id) {
+  has_changed(id);
+  landmarks_.bury(id);
+}
+
+void Map::replace(LandmarkId id, LandmarkId by) {
+  has_changed(id);
+  if (const LandmarkId forgotten = landmarks_.replace(id, by); forgotten.valid()) has_changed(forgotten);
 }
 
 Keyframe& Map::add_keyframe(KeyframeId id, std::shared_ptr<const FeatureFrame> frame, const SE3& camera_from_world) {
@@ -84,8 +87,8 @@ Keyframe& Map::add_keyframe(KeyframeId id, std::shared_ptr<const FeatureFrame> f
 }
 
 LandmarkId Map::add_landmark(const Vec3& position, KeyframeId keyframe, int keypoint) {
-  const LandmarkId id(static_cast<int32_t>(landmarks_.size()));
-  Landmark& landmark = *landmarks_.emplace_back(std::make_unique<Landmark>()).living;
+  const LandmarkId id = landmarks_.give_out(1);
+  Landmark& landmark = landmarks_.insert(id);
   landmark.view.position = position;
   landmark.view.alive = true;
   landmark.created_by = keyframe;
@@ -133,7 +136,7 @@ void Map::fuse(LandmarkId from, LandmarkId to) {
   count_sightings(to, landmark(from).times_visible, landmark(from).times_found);
   erase_landmark(from);
   for (const auto& [keyframe, keypoint] : moved) add_observation(to, keyframe, keypoint);
-  bury(from, to);
+  replace(from, to);
   update_view(to);
 }
 
@@ -229,12 +232,10 @@ void Map::apply(const MapCorrection& correction) {
     keyframe.scale *= move.scale;
     if (!keyframe.culled) set_pose(keyframe.id, (Sim3(keyframe.camera_from_world) * move.inverse()).rigid());
   }
-  for (size_t i = 0; i < landmarks_.size(); ++i) {
-    if (!landmarks_[i].living) continue;
-    const Landmark& landmark = *landmarks_[i].living;
-    const KeyframeId reference = std::ranges::min(landmark.observations, {}, &LandmarkObservation::keyframe).keyframe;
-    const LandmarkId id(static_cast<int32_t>(i));
-    Vec3 position = moves[static_cast<size_t>(reference.value)] * landmark.view.position;
+  for (const LandmarkId id : landmarks_.living()) {
+    const KeyframeId reference =
+        std::ranges::min(landmark(id).observations, {}, &LandmarkObservation::keyframe).keyframe;
+    Vec3 position = moves[static_cast<size_t>(reference.value)] * landmark(id).view.position;
     if (const auto shift = correction.landmark_shifts.find(id); shift != correction.landmark_shifts.end()) {
       position += shift->second;
     }
@@ -275,19 +276,26 @@ void Map::append(const Map& other) {
     if (keyframe.culled) anchors_[keyframe.parent].push_back(keyframe.id);
     keyframes_.push_back(std::move(keyframe));
   }
-  for (const LandmarkSlot& theirs : other.landmarks_) {
-    changed_chunks_.insert(static_cast<int>(landmarks_.size()) / LandmarkChunk::kSize);
-    LandmarkSlot& slot = landmarks_.emplace_back(nullptr, theirs.replaced_by);
-    count_on(slot.replaced_by);
-    if (!theirs.living) continue;
-    slot.living = std::make_unique<Landmark>(*theirs.living);
-    count_on(slot.living->created_by);
-    for (LandmarkObservation& o : slot.living->observations) count_on(o.keyframe);
+  landmarks_.give_out(other.num_landmarks());
+  for (const LandmarkId theirs : other.landmarks_.living()) {
+    LandmarkId id = theirs;
+    count_on(id);
+    Landmark& landmark = landmarks_.insert(id);
+    landmark = other.landmark(theirs);
+    count_on(landmark.created_by);
+    for (LandmarkObservation& o : landmark.observations) count_on(o.keyframe);
   }
+  for (LandmarkId id : other.landmarks_.replaced()) {
+    LandmarkId by = other.landmarks_.replacement(id);
+    count_on(id);
+    count_on(by);
+    replace(id, by);
+  }
+  for (int i = num_landmarks; i < static_cast<int>(landmarks_.size()); ++i) has_changed(LandmarkId(i));
 }
 
 void Map::count_sightings(LandmarkId id, int visible, int found) {
-  Landmark* landmark = landmarks_[static_cast<size_t>(id.value)].living.get();  // no reader sees the counters
+  Landmark* landmark = landmarks_.find(id);  // no reader sees the counters
   if (!landmark) return;
   landmark->times_visible += visible;
   landmark->times_found += found;
@@ -308,6 +316,18 @@ std::vector<CovisibleKeyframe> Map::covisible_keyframes(KeyframeId id, int min_s
   return result;
 }
 
+LandmarkChunk Map::chunk(int index) const {
+  LandmarkChunk result;
+  const int begin = index * LandmarkChunk::kSize;
+  const int end = std::min(begin + LandmarkChunk::kSize, static_cast<int>(landmarks_.size()));
+  for (int i = begin; i < end; ++i) {
+    const LandmarkId id(i);
+    if (const Landmark* living = landmarks_.find(id)) result.add(i - begin, living->view);
+    if (const LandmarkId by = landmarks_.replacement(id); by.valid()) result.replace(i - begin, by);
+  }
+  return result;
+}
+
 std::shared_ptr<const MapSnapshot> Map::snapshot() {
   auto next = published_ ? std::make_shared<MapSnapshot>(*published_) : std::make_shared<MapSnapshot>();
   ++next->version;
@@ -321,16 +341,11 @@ std::shared_ptr<const MapSnapshot> Map::snapshot() {
   }
   next->num_landmarks = static_cast<int>(landmarks_.size());
   next->landmark_chunks.resize((landmarks_.size() + LandmarkChunk::kSize - 1) / LandmarkChunk::kSize);
-  for (const int chunk : changed_chunks_) {
-    auto copy = std::make_shared<LandmarkChunk>();
-    const size_t begin = static_cast<size_t>(chunk) * LandmarkChunk::kSize;
-    const size_t end = std::min(begin + LandmarkChunk::kSize, landmarks_.size());
-    for (size_t i = begin; i < end; ++i) {
-      const auto slot = static_cast<int>(i - begin);
-      if (landmarks_[i].living) copy->add(slot, landmarks_[i].living->view);
-      if (landmarks_[i].replaced_by.valid()) copy->replace(slot, landmarks_[i].replaced_by);
-    }
-    next->landmark_chunks[static_cast<size_t>(chunk)] = std::move(copy);
+  static const auto kEmpty = std::make_shared<const LandmarkChunk>();
+  for (const int index : changed_chunks_) {
+    LandmarkChunk changed = chunk(index);
+    next->landmark_chunks[static_cast<size_t>(index)] =
+        changed.empty() ? kEmpty : std::make_shared<const LandmarkChunk>(std::move(changed));
   }
   changed_keyframes_.clear();
   changed_chunks_.clear();

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "map/landmark_table.h"
 #include "map/map_correction.h"
 #include "map/snapshot.h"
 
@@ -80,18 +81,15 @@ class Map {
   Keyframe& mutable_keyframe(KeyframeId id);
   void tie(KeyframeId anchor, KeyframeId parent);
   Landmark* mutable_landmark(LandmarkId id);
-  void bury(LandmarkId id, LandmarkId replaced_by = {});
-
-  /// Dead landmarks keep their id, but hardly any memory.
-  struct LandmarkSlot {
-    std::unique_ptr<Landmark> living;
-    LandmarkId replaced_by;
-  };
+  void bury(LandmarkId id);
+  void replace(LandmarkId id, LandmarkId by);
+  void has_changed(LandmarkId id) { changed_chunks_.insert(id.value / LandmarkChunk::kSize); }
+  LandmarkChunk chunk(int index) const;
 
   double scale_factor_;
   int num_levels_;
   std::deque<Keyframe> keyframes_;
-  std::deque<LandmarkSlot> landmarks_;
+  LandmarkTable landmarks_;
   std::map<KeyframeId, std::vector<KeyframeId>> anchors_;  // culled keyframes by their parents, which are not culled
   std::set<KeyframeId> changed_keyframes_;                 // since the last snapshot
   std::set<int> changed_chunks_;

@@ -11,14 +11,32 @@ void serialize(Archive& a, PixelObservation& o) { a(o.pixel, o.u_right, o.invers
 
 void serialize(Archive& a, LandmarkObservation& o) { a(o.keyframe, o.keypoint); }
 
-void serialize(Archive& a, Landmark& l, LandmarkId& replaced_by) {
+void serialize(Archive& a, Landmark& l) {
   LandmarkView& v = l.view;
-  a(v.position, v.normal, v.min_distance, v.max_distance, v.descriptor, v.alive, replaced_by);
+  a(v.position, v.normal, v.min_distance, v.max_distance, v.descriptor, v.alive);
   a(l.observations, l.created_by, l.times_visible, l.times_found);
 }
 
 void serialize(Archive& a, FeatureFrame& f) {
   a(f.frame, f.timestamp_ns, f.features.keypoints, f.features.descriptors, f.depth, f.observations);
+}
+
+/// Of the dead only those that were replaced are written: a session does not grow with what its map no longer has.
+void serialize(Archive& a, LandmarkTable& table) {
+  std::vector<LandmarkId> living = table.living();
+  std::vector<LandmarkId> replaced(table.replaced().begin(), table.replaced().end());
+  uint64_t given_out = table.size();
+  a(given_out, living, replaced);
+  if (a.reading()) {
+    table = {};
+    table.give_out(given_out);
+  }
+  for (LandmarkId id : living) a(a.reading() ? table.insert(id) : *table.find(id));
+  for (LandmarkId id : replaced) {
+    LandmarkId by = table.replacement(id);
+    a(by);
+    if (a.reading()) table.replace(id, by);
+  }
 }
 
 void Map::serialize(Archive& a, int image_width, int image_height) {
@@ -40,16 +58,9 @@ void Map::serialize(Archive& a, int image_width, int image_height) {
       if (k.culled) anchors_[k.parent].push_back(k.id);
     }
   }
-  landmarks_.resize(a.count(landmarks_.size()));
-  for (size_t i = 0; i < landmarks_.size(); ++i) {
-    LandmarkSlot& slot = landmarks_[i];
-    Landmark landmark;
-    if (!a.reading() && slot.living) landmark = *slot.living;
-    photoslam::serialize(a, landmark, slot.replaced_by);
-    if (!a.reading()) continue;
-    slot.living = landmark.view.alive ? std::make_unique<Landmark>(std::move(landmark)) : nullptr;
-    changed_chunks_.insert(static_cast<int>(i) / LandmarkChunk::kSize);
-  }
+  a(landmarks_);
+  if (!a.reading()) return;
+  for (int i = 0; i < static_cast<int>(landmarks_.size()); ++i) has_changed(LandmarkId(i));
 }
 
 }  // namespace photoslam

@@ -300,5 +300,19 @@ TEST_F(CorrectedMap, AnArchiveHoldsAllOfIt) {
   EXPECT_GT(near_b, 0);
 }
 
+TEST_F(CorrectedMap, AnArchiveDoesNotGrowWithTheDead) {
+  const auto bytes = [&] {
+    Archive saved;
+    map.serialize(saved, world.camera.width, world.camera.height);
+    return saved.bytes().size();
+  };
+  const size_t before = bytes();
+  const LandmarkId place = map.keyframe(KeyframeId(0)).landmarks[0];
+  map.erase_landmark(place);
+  for (int i = 0; i < 1000; ++i) map.erase_landmark(map.add_landmark(Vec3(0, 0, 3), KeyframeId(0), 0));
+  EXPECT_LE(bytes(), before);
+  EXPECT_GE(map.num_landmarks(), 1000u);
+}
+
 }  // namespace
 }  // namespace photoslam

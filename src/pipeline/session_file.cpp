@@ -19,7 +19,7 @@
 namespace photoslam {
 namespace {
 
-constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 9, .oldest = 9};
+constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 10, .oldest = 10};
 
 /// Lets deflate or inflate work through the input; their counts have 32 bits.
 template <class Step>
