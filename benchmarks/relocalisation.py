@@ -49,8 +49,8 @@ def walk(views: list[tuple[list[float], Quaternion]], places: int) -> list[tuple
     return poses
 
 
-def write_walk(poses: list[tuple[list[float], Quaternion]], path: pathlib.Path) -> pathlib.Path:
-    lines = (" ".join(f"{x:.9f}" for x in (i / RATE, *position, *orientation)) for i, (position, orientation)
+def write_walk(poses: list[tuple[list[float], Quaternion]], path: pathlib.Path, rate: float) -> pathlib.Path:
+    lines = (" ".join(f"{x:.9f}" for x in (i / rate, *position, *orientation)) for i, (position, orientation)
              in enumerate(poses))
     path.write_text("\n".join(lines) + "\n")
     return path
@@ -96,7 +96,7 @@ def main() -> int:
     views = list(read_poses(mapped / "groundtruth.txt").values())
     poses = walk(views, arguments.places)
     visited = film(program, "room", len(poses), scratch / "visited", "--fps", RATE, "--trajectory",
-                   write_walk(poses, scratch / "walk.txt"))
+                   write_walk(poses, scratch / "walk.txt", RATE))
     for sensor in arguments.sensors.split(","):
         study(program, sensor, scratch, mapped, visited, arguments.places)
     return 0

@@ -14,6 +14,7 @@ void RelocalizationOptions::visit(OptionVisitor& v) {
           min_inliers);
   v.value({"search_radius_px", "px", 1.0, 100.0, "Search radius for further landmarks around the pose found."},
           search_radius_px);
+  evidence.visit(v);
   v.group("pose_ransac", "Robust pose from matches.", pose_ransac);
 }
 
@@ -67,6 +68,16 @@ std::optional<SE3> Relocalizer::pose_against(const MapSnapshot& map, const Featu
   return verified(map, frame, candidate, *pose);
 }
 
+PlaceEvidence Relocalizer::evidence(const FeatureFrame& frame, const FrameMatches& matches) {
+  PlaceEvidence evidence(alignment_.camera().width, alignment_.camera().height, frame.features);
+  for (const ProjectionQuery& query : alignment_.projector().queries()) evidence.expect(query.x, query.y);
+  for (size_t i = 0; i < matches.matched.size(); ++i) {
+    const Keypoint& keypoint = frame.features.keypoints[i];
+    if (matches.matched[i]) evidence.find(keypoint.x, keypoint.y);
+  }
+  return evidence;
+}
+
 /// Chance agrees with a dozen descriptors; it does not put the landmarks all around where the frame has them.
 std::optional<SE3> Relocalizer::verified(const MapSnapshot& map, const FeatureFrame& frame, KeyframeId candidate,
                                          SE3 pose) {
@@ -81,14 +92,15 @@ std::optional<SE3> Relocalizer::verified(const MapSnapshot& map, const FeatureFr
   match_options.max_ratio = 0.85;
   match_options.check_rotation = false;
   int inliers = 0;
+  FrameMatches matches;
   for (const double radius : {options_.search_radius_px, options_.search_radius_px / 2}) {
-    FrameMatches matches(frame.size());
+    matches = FrameMatches(frame.size());
     alignment_.project_landmarks(pose, map, keyframes, static_cast<float>(radius), matches);
     alignment_.match(frame, match_options, matches);
     inliers = alignment_.refine(frame, matches, pose);
     if (inliers < options_.min_inliers / 2) return std::nullopt;
   }
-  if (inliers < options_.min_inliers) return std::nullopt;
+  if (inliers < options_.min_inliers || !evidence(frame, matches).suffices(options_.evidence)) return std::nullopt;
   return pose;
 }
 

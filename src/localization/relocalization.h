@@ -8,6 +8,7 @@
 #include "features/place_index.h"
 #include "geometry/absolute_pose.h"
 #include "localization/frame_alignment.h"
+#include "localization/place_evidence.h"
 
 namespace photoslam {
 
@@ -16,6 +17,7 @@ struct RelocalizationOptions {
   int min_matches = 15;
   int min_inliers = 40;
   double search_radius_px = 8.0;
+  PlaceEvidenceOptions evidence{.min_matched_share = 0.2, .min_coverage = 0.3};  ///< Views from elsewhere find less.
   PoseRansacOptions pose_ransac;
   void visit(OptionVisitor& visitor);
 };
@@ -42,6 +44,8 @@ class Relocalizer {
  private:
   std::optional<SE3> pose_against(const MapSnapshot& map, const FeatureFrame& frame, KeyframeId candidate);
   std::optional<SE3> verified(const MapSnapshot& map, const FeatureFrame& frame, KeyframeId candidate, SE3 pose);
+  /// What the frame shows of what was last projected into it.
+  PlaceEvidence evidence(const FeatureFrame& frame, const FrameMatches& matches);
 
   RelocalizationOptions options_;
   FrameAlignment alignment_;

@@ -71,5 +71,28 @@ TEST_F(RelocalizerTest, FindsNothingInAnotherPlaceMadeOfTheSameCorners) {
   }
 }
 
+TEST_F(RelocalizerTest, ADoorThatLooksLikeAnotherOneIsNotItsPlace) {
+  // What is around the door differs, and of the door alone there is enough to fix a pose.
+  PointWorld other(2, 5000);
+  other.flipped_bits = world.flipped_bits;
+  for (size_t i = 0; i < world.points.size(); ++i) {
+    const Vec3& p = world.points[i];
+    if (p.z() < 3 || std::abs(p.x()) > 0.3) continue;
+    other.points[i] = p;
+    other.descriptors[i] = world.descriptors[i];
+  }
+  RelocalizationOptions by_number;
+  by_number.evidence = {.min_matched_share = 0, .min_coverage = 0};
+  Relocalizer trusting(by_number, FrameAlignment({}, {}, world.camera, world.bf));
+  trusting.update(*map);
+  int trusted = 0;
+  for (int i = 0; i < 20; ++i) {
+    const auto frame = other.observe(PointWorld::camera_from_world(0.02 * i), i);
+    EXPECT_FALSE(relocalizer.relocalize(*map, *frame, KeyframeId(0))) << i;
+    trusted += trusting.relocalize(*map, *frame, KeyframeId(0)).has_value();
+  }
+  EXPECT_GE(trusted, 15) << "else nothing is shown";
+}
+
 }  // namespace
 }  // namespace photoslam

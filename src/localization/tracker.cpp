@@ -57,6 +57,11 @@ void TrackerOptions::visit(OptionVisitor& v) {
           local_map_radius_px);
   v.value({"max_local_keyframes", "", 1, 1000, "Keyframes whose landmarks are searched in each frame."},
           max_local_keyframes);
+  v.value(
+      {"doubtful_share", "", 0.0, 1.0,
+       "A pose where less than this share of the landmarks that should be visible is found is doubted: the camera is "
+       "looked for in the whole map, and where more is found it is."},
+      doubtful_share);
   v.value({"recently_lost_s", "s", 0.0, 1000.0,
            "After this long without a pose the state is lost, and a separate map may begin."},
           recently_lost_s);
@@ -99,34 +104,33 @@ TrackingResult Tracker::track(const std::shared_ptr<const FeatureFrame>& frame, 
     last_ = nothing;
   }
 
-  SE3 camera_from_world;
-  KeyframeId reference = reference_;
-  bool found = lost_frames_ == 0 && track_last_frame(*frame, camera_from_world);
-  if (!found && map_) {
-    const auto relocalization = relocalizer_.relocalize(*map_, *frame, reference_);
-    found = relocalization.has_value();
-    if (found) {
-      camera_from_world = relocalization->camera_from_world;
-      reference = relocalization->keyframe;
-    }
-  }
-  std::string reason = frame->size() < 50 ? "too little texture" : "too few matches";
-  if (found) {
-    FrameMatches matches(frame->size());
-    const int num_inliers = track_local_map(*frame, camera_from_world, matches);
-    if (num_inliers >= options_.min_inliers) {
-      if (reference != reference_) lost_frames_ = std::max(lost_frames_, 1);  // the last frame tells no velocity
-      reference_ = reference;
-      return tracked(frame, camera_from_world, std::move(matches), num_inliers, may_become_keyframe);
-    }
-    reason = "too few landmarks of the local map";
+  std::optional<Located> located = locate(*frame);
+  if (located && located->num_inliers >= options_.min_inliers) {
+    count_sightings(*located);
+    return tracked(frame, std::move(*located), may_become_keyframe);
   }
   const double gap_s = 1e-9 * static_cast<double>(frame->timestamp_ns - last_->timestamp_ns);
   if (gap_s > options_.recently_lost_s && may_become_keyframe) {
     TrackingResult result = start_map(frame);
     if (result.has_pose) return result;
   }
-  return lost(*frame, std::move(reason));
+  const char* few = frame->size() < 50 ? "too little texture" : "too few matches";
+  return lost(*frame, located ? "too few landmarks of the local map" : few);
+}
+
+/// Where the motion leads to; where the map looks like the frame, if nothing or too little of the map is found there.
+std::optional<Tracker::Located> Tracker::locate(const FeatureFrame& frame) {
+  std::optional<Located> located;
+  SE3 predicted;
+  if (lost_frames_ == 0 && track_last_frame(frame, predicted)) located = track_local_map(frame, predicted, reference_);
+  const bool is_certain =
+      located && located->num_inliers >= options_.min_inliers && located->share >= options_.doubtful_share;
+  if (is_certain || !map_) return located;
+  if (const auto found = relocalizer_.relocalize(*map_, frame, reference_)) {
+    Located elsewhere = track_local_map(frame, found->camera_from_world, found->keyframe);
+    if (!located || elsewhere.num_inliers > located->num_inliers) located = std::move(elsewhere);
+  }
+  return located;
 }
 
 /// Begins a map with this frame. Its world is that of its first keyframe, moved aside from those of earlier maps.
@@ -193,9 +197,12 @@ TrackingResult Tracker::lost(const FeatureFrame& frame, std::string reason) {
   return result;
 }
 
-TrackingResult Tracker::tracked(const std::shared_ptr<const FeatureFrame>& frame, const SE3& camera_from_world,
-                                FrameMatches matches, int num_inliers, bool may_become_keyframe) {
+TrackingResult Tracker::tracked(const std::shared_ptr<const FeatureFrame>& frame, Located located,
+                                bool may_become_keyframe) {
+  const SE3& camera_from_world = located.camera_from_world;
   velocity_.reset();
+  if (located.reference != reference_) lost_frames_ = std::max(lost_frames_, 1);  // the last frame tells no velocity
+  reference_ = located.reference;
   const auto elapsed = static_cast<double>(frame->timestamp_ns - last_->timestamp_ns);
   if (lost_frames_ == 0 && elapsed > 0) velocity_ = (camera_from_world * last_pose().inverse()).log() / elapsed;
   lost_frames_ = 0;
@@ -209,16 +216,17 @@ TrackingResult Tracker::tracked(const std::shared_ptr<const FeatureFrame>& frame
   result.camera_from_reference = camera_from_world * pose_of(reference_).inverse();
   result.reference_scale = scale_of(reference_);
   result.num_features = static_cast<int>(frame->size());
-  result.num_inliers = num_inliers;
-  if (may_become_keyframe && keyframe_decision_.should_insert(frame->timestamp_ns, camera_from_world, num_inliers,
-                                                              median_depth(camera_from_world, matches))) {
-    result.keyframe = propose(frame, result, matches);
+  result.num_inliers = located.num_inliers;
+  if (may_become_keyframe &&
+      keyframe_decision_.should_insert(frame->timestamp_ns, camera_from_world, located.num_inliers,
+                                       median_depth(camera_from_world, located.matches))) {
+    result.keyframe = propose(frame, result, located.matches);
     result.reference = reference_;
     result.camera_from_reference = SE3{};
     result.reference_scale = scale_of(reference_);
   }
   last_ = frame;
-  last_matches_ = std::move(matches);
+  last_matches_ = std::move(located.matches);
   last_camera_from_reference_ = result.camera_from_reference;
   last_reference_scale_ = result.reference_scale;
   return result;
@@ -292,16 +300,21 @@ bool Tracker::track_last_frame(const FeatureFrame& frame, SE3& camera_from_world
   return false;
 }
 
-int Tracker::track_local_map(const FeatureFrame& frame, SE3& camera_from_world, FrameMatches& matches) {
+Tracker::Located Tracker::track_local_map(const FeatureFrame& frame, const SE3& camera_from_world,
+                                          KeyframeId reference) {
+  Located result{camera_from_world, reference, FrameMatches(frame.size()), 0, 1, {}};
   MatchOptions match_options;
   match_options.max_ratio = 0.85;
   match_options.check_rotation = false;
   const auto radius = static_cast<float>(options_.local_map_radius_px);
+  PlaceEvidence evidence(camera_.width, camera_.height, frame.features);
   if (map_) {
-    alignment_.project_landmarks(camera_from_world, *map_, local_keyframes(camera_from_world), radius, matches);
-    alignment_.match(frame, match_options, matches);
-    for (size_t i = 0; i < alignment_.projector().size(); ++i) {
-      ++sightings_[alignment_.projector().point(i).landmark].visible;
+    const LandmarkProjector& projected = alignment_.projector();
+    alignment_.project_landmarks(camera_from_world, *map_, local_keyframes(camera_from_world), radius, result.matches);
+    alignment_.match(frame, match_options, result.matches);
+    for (size_t i = 0; i < projected.size(); ++i) {
+      result.visible.push_back(projected.point(i).landmark);
+      evidence.expect(projected.queries()[i].x, projected.queries()[i].y);
     }
   }
   // What the newest keyframes measured, until the map has landmarks for it.
@@ -310,13 +323,19 @@ int Tracker::track_local_map(const FeatureFrame& frame, SE3& camera_from_world, 
     alignment_.projector().add(camera_from_world, {LandmarkId{}, seen, point}, by.features,
                                static_cast<size_t>(seen.keypoint), radius);
   });
-  alignment_.match(frame, match_options, matches);
+  alignment_.match(frame, match_options, result.matches);
 
-  const int num_inliers = alignment_.refine(frame, matches, camera_from_world);
-  for (size_t i = 0; i < frame.size(); ++i) {
-    if (matches.matched[i] && matches.point[i].landmark.valid()) ++sightings_[matches.point[i].landmark].found;
+  result.num_inliers = alignment_.refine(frame, result.matches, result.camera_from_world);
+  if (evidence.findable() > 0) result.share = static_cast<double>(result.num_inliers) / evidence.findable();
+  return result;
+}
+
+void Tracker::count_sightings(const Located& located) {
+  for (const LandmarkId id : located.visible) ++sightings_[id].visible;
+  for (size_t i = 0; i < located.matches.matched.size(); ++i) {
+    const LandmarkId id = located.matches.point[i].landmark;
+    if (located.matches.matched[i] && id.valid()) ++sightings_[id].found;
   }
-  return num_inliers;
 }
 
 std::vector<KeyframeId> Tracker::local_keyframes(const SE3& camera_from_world) const {

@@ -28,6 +28,7 @@ struct TrackerOptions {
   double last_frame_radius_px = 12.0;
   double local_map_radius_px = 4.0;
   int max_local_keyframes = 25;
+  double doubtful_share = 0.1;
   double recently_lost_s = 2.0;
   MonoInitializerOptions initialization;
   PoseRefinementOptions pose_refinement;
@@ -52,9 +53,9 @@ struct TrackingResult {
 /// Localization: the pose of each frame against a snapshot of the map (paper, Sec. 3.2, Eq. 1).
 ///
 /// Constant-velocity prediction, projection search from the last frame, then of the local map, motion-only bundle
-/// adjustment after each; relocalisation when that fails. When it fails for long, a map of its own is begun, whose
-/// world lies far away from the others. Synchronous and deterministic: results depend on the frames and snapshots
-/// passed so far only.
+/// adjustment after each; relocalisation when that fails or finds little of what should be seen. When it fails for
+/// long, a map of its own is begun, whose world lies far away from the others. Synchronous and deterministic: results
+/// depend on the frames and snapshots passed so far only.
 class Tracker {
  public:
   /// bf = fx * baseline [px m]; 0 for a single camera, whose unit of length is then arbitrary.
@@ -73,10 +74,19 @@ class Tracker {
  private:
   using Points = std::vector<PendingKeyframes::Point>;
 
+  /// A pose, and what the frame shows of the map there.
+  struct Located {
+    SE3 camera_from_world;
+    KeyframeId reference;
+    FrameMatches matches;
+    int num_inliers = 0;
+    double share = 1;  ///< Inliers among the landmarks that could be found.
+    std::vector<LandmarkId> visible;
+  };
+
   TrackingResult start_map(const std::shared_ptr<const FeatureFrame>& frame);
   TrackingResult lost(const FeatureFrame& frame, std::string reason);
-  TrackingResult tracked(const std::shared_ptr<const FeatureFrame>& frame, const SE3& camera_from_world,
-                         FrameMatches matches, int num_inliers, bool may_become_keyframe);
+  TrackingResult tracked(const std::shared_ptr<const FeatureFrame>& frame, Located located, bool may_become_keyframe);
 
   SE3 pose_of(KeyframeId keyframe) const { return pending_.camera_from_world(keyframe, map_.get()); }
   double scale_of(KeyframeId keyframe) const { return pending_.scale(keyframe, map_.get()); }
@@ -84,7 +94,9 @@ class Tracker {
   SE3 last_pose() const;
   void resolve_last_matches();
   bool track_last_frame(const FeatureFrame& frame, SE3& camera_from_world);
-  int track_local_map(const FeatureFrame& frame, SE3& camera_from_world, FrameMatches& matches);
+  Located track_local_map(const FeatureFrame& frame, const SE3& camera_from_world, KeyframeId reference);
+  std::optional<Located> locate(const FeatureFrame& frame);
+  void count_sightings(const Located& located);
   std::vector<KeyframeId> local_keyframes(const SE3& camera_from_world) const;
   KeyframeProposal propose(const std::shared_ptr<const FeatureFrame>& frame, const TrackingResult& result,
                            const FrameMatches& matches);

@@ -77,6 +77,31 @@ TEST_F(TrackerTest, LosesWithAReasonAndFindsTheMapAgain) {
   EXPECT_LT(pose_error(found.camera_from_world, truth).position, 1e-3);
 }
 
+TEST_F(TrackerTest, APoseWhereLittleOfTheMapIsFoundIsDoubted) {
+  // The camera is carried back to where it began, and a few things in its view come along.
+  std::shared_ptr<const FeatureFrame> last;
+  for (int frame = 0; frame < 75; ++frame) {
+    const SE3 pose = PointWorld::camera_from_world(frame / 30.0);
+    step(frame, pose);
+    last = world.observe(pose, frame);
+  }
+  const SE3 truth = PointWorld::camera_from_world(0);
+  auto carried = std::make_shared<FeatureFrame>(*world.observe(truth, 75));
+  for (size_t i = 0; i < 40; ++i) {
+    const size_t along = i * last->size() / 40;
+    carried->features.keypoints.push_back(last->features.keypoints[along]);
+    carried->features.descriptors.push_back(last->features.descriptors[along]);
+    carried->depth.push_back(last->depth[along]);
+    carried->observations.push_back(last->observations[along]);
+  }
+  carried->grid.build(carried->features.keypoints, world.camera.width, world.camera.height);
+
+  const TrackingResult result = tracker.track(carried, snapshot, false);
+  ASSERT_TRUE(result.has_pose) << result.reason;
+  EXPECT_LT(pose_error(result.camera_from_world, truth).position, 1e-3);
+  EXPECT_GT(result.num_inliers, 200);
+}
+
 TEST_F(TrackerTest, LostForLongItBeginsAnotherMapAndFindsTheOldOneAgain) {
   for (int frame = 0; frame < 30; ++frame) step(frame, PointWorld::camera_from_world(frame / 30.0));
   const auto num_keyframes = snapshot->keyframes.size();

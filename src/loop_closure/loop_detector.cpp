@@ -3,7 +3,6 @@
 #include "loop_closure/loop_detector.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -11,52 +10,6 @@
 
 namespace photoslam {
 namespace {
-
-/// What was expected and found in the cells of an image.
-class CellCounts {
- public:
-  CellCounts(const PinholeCamera& camera, const Features& features) : camera_(camera) {
-    for (const Keypoint& k : features.keypoints) ++keypoints_[cell(k.x, k.y)];
-  }
-
-  void count(const ProjectionQuery& query, bool found) {
-    ++expected_[cell(query.x, query.y)];
-    found_[cell(query.x, query.y)] += found;
-  }
-
-  /// Noisy measurements make a landmark anew in every keyframe, and keypoints are shared out among them.
-  int findable() const {
-    int sum = 0;
-    for (size_t i = 0; i < expected_.size(); ++i) sum += std::min(expected_[i], keypoints_[i]);
-    return sum;
-  }
-
-  /// Whether what was found is spread over the image as what was expected is.
-  double coverage() const {
-    int cells = 0, covered = 0;
-    for (size_t i = 0; i < expected_.size(); ++i) {
-      if (expected_[i] < kMinExpected) continue;
-      ++cells;
-      covered += found_[i] >= kMinFoundShare * expected_[i];
-    }
-    return cells > 0 ? static_cast<double>(covered) / cells : 0;
-  }
-
- private:
-  static constexpr int kColumns = 8, kRows = 6, kMinExpected = 3;
-  static constexpr double kMinFoundShare = 0.2;
-
-  size_t cell(float x, float y) const {
-    const auto along = [](float position, int size, int cells) {
-      return std::clamp(static_cast<int>(position * static_cast<float>(cells) / static_cast<float>(size)), 0,
-                        cells - 1);
-    };
-    return static_cast<size_t>(along(y, camera_.height, kRows) * kColumns + along(x, camera_.width, kColumns));
-  }
-
-  const PinholeCamera& camera_;
-  std::array<int, kColumns * kRows> expected_{}, found_{}, keypoints_{};
-};
 
 /// Those that share landmarks with a keyframe, at least a quarter as many as the one that shares most: drift lets a few
 /// of an old place fit by chance, long before its loop is closed.
@@ -90,14 +43,7 @@ void LoopDetectorOptions::visit(OptionVisitor& v) {
   v.value(
       {"min_guided_share", "", 0.0, 1.0, "… or this share of the keypoints whose depth the keyframe knows, if fewer."},
       min_guided_share);
-  v.value({"min_matched_share", "", 0.0, 1.0,
-           "Share of the landmarks that should be visible and is found again, and two standard deviations more: fewer "
-           "landmarks tell less. Lower finds loops under changed light, higher resists places that repeat."},
-          min_matched_share);
-  v.value({"min_coverage", "", 0.0, 1.0,
-           "Share of the image, of what should show the old place, in which some of it is found again: a thing that "
-           "looks like another one does not look so all around it."},
-          min_coverage);
+  evidence.visit(v);
   v.value({"search_radius_px", "px", 0.5, 100.0, "Search radius around a predicted landmark."}, search_radius_px);
   v.value({"min_shift_px", "px", 0.0, 1000.0, "Landmarks that are less away from where the loop wants them need none."},
           min_shift_px);
@@ -206,24 +152,16 @@ LoopDetector::Search LoopDetector::search(const MapSnapshot& map, std::span<cons
   matcher_.match(match_options, {keyframe.frame->features, keyframe.frame->grid, {}, {}}, projector_.queries(),
                  keypoint_of_query);
   Search result;
-  CellCounts cells(camera_, keyframe.frame->features);
-  for (size_t query = 0; query < keypoint_of_query.size(); ++query) {
-    const bool found = keypoint_of_query[query] != kNoMatch;
-    cells.count(projector_.queries()[query], found);
-    if (found) result.matches.emplace_back(projector_.point(query).landmark, keypoint_of_query[query]);
+  PlaceEvidence evidence(camera_.width, camera_.height, keyframe.frame->features);
+  for (size_t i = 0; i < keypoint_of_query.size(); ++i) {
+    const ProjectionQuery& query = projector_.queries()[i];
+    evidence.expect(query.x, query.y);
+    if (keypoint_of_query[i] == kNoMatch) continue;
+    evidence.find(query.x, query.y);
+    result.matches.emplace_back(projector_.point(i).landmark, keypoint_of_query[i]);
   }
-  result.findable = cells.findable();
-  result.coverage = cells.coverage();
+  result.is_same_place = evidence.suffices(options_.evidence);
   return result;
-}
-
-/// Whether more was found than of a place that only looks alike: of that it would be `min_matched_share`, give or take
-/// the deviation of a binomial distribution, and not everywhere.
-bool LoopDetector::is_same_place(const Search& search) const {
-  constexpr double kDeviations = 2;
-  const double share = options_.min_matched_share, mean = share * search.findable;
-  return static_cast<double>(search.matches.size()) > mean + kDeviations * std::sqrt((1 - share) * mean) &&
-         search.coverage >= options_.min_coverage;
 }
 
 /// Whether as many matches agree as fix the transform well, or as a keyframe that knows little can be asked for.
@@ -269,7 +207,7 @@ std::optional<Loop> LoopDetector::verify(const MapSnapshot& map, KeyframeId then
       if (found.inlier[i]) loop.matches.push_back(usable[i]);
     }
   }
-  return is_same_place(seen) && is_precise(map, loop) ? std::optional(loop) : std::nullopt;
+  return seen.is_same_place && is_precise(map, loop) ? std::optional(loop) : std::nullopt;
 }
 
 /// Whether the map has the landmarks already where the loop wants them in the image, and not by chance.
@@ -313,7 +251,7 @@ bool LoopDetector::confirm(const MapSnapshot& map, const Loop& loop) {
     const Sim3 neighbour_from_now(keyframe.camera_from_world * world_from_now);
     const SE3 pose = (neighbour_from_now * loop.now_from_then * Sim3(then_from_world)).rigid();
     const Search seen = search(map, loop.landmarks, pose, keyframe, options_.search_radius_px);
-    confirmed += is_same_place(seen);
+    confirmed += seen.is_same_place;
   }
   return confirmed >= options_.min_confirmations;
 }

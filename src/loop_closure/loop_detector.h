@@ -11,6 +11,7 @@
 #include "features/place_index.h"
 #include "geometry/similarity_ransac.h"
 #include "localization/landmark_projection.h"
+#include "localization/place_evidence.h"
 #include "map/snapshot.h"
 
 namespace photoslam {
@@ -21,8 +22,7 @@ struct LoopDetectorOptions {
   int min_matches = 20;
   int min_guided_matches = 40;
   double min_guided_share = 0.3;
-  double min_matched_share = 0.25;
-  double min_coverage = 0.5;
+  PlaceEvidenceOptions evidence;
   double search_radius_px = 6.0;
   double min_shift_px = 3.0;
   int neighbourhood = 10;
@@ -62,13 +62,11 @@ class LoopDetector {
   std::vector<PointMatch> match_features(const MapSnapshot& map, const Keyframe& then, const Keyframe& now) const;
   /// What a keyframe at a given pose finds of the landmarks it should see.
   struct Search {
-    int findable = 0;     ///< Expected landmarks, but in no part of the image more than it has keypoints.
-    double coverage = 0;  ///< Share of the image cells with expected landmarks in which some were found.
     std::vector<std::pair<LandmarkId, int>> matches;
+    bool is_same_place = false;
   };
   Search search(const MapSnapshot& map, std::span<const LandmarkId> landmarks, const SE3& camera_from_world,
                 const Keyframe& keyframe, double radius_px);
-  bool is_same_place(const Search& search) const;
   bool is_precise(const MapSnapshot& map, const Loop& loop) const;
   bool is_met(const MapSnapshot& map, const Loop& loop) const;
   bool is_news(const MapSnapshot& map, const Loop& loop) const;
