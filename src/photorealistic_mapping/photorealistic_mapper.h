@@ -39,7 +39,7 @@ struct LearningRateOptions {
 struct PhotorealisticOptions {
   double ssim_weight_online = 0.0;
   double ssim_weight = 0.2;
-  double depth_weight = 0.0;
+  double depth_weight = 0.1;
   double opacity_weight = 0.0;
   int sh_degree = 3;
   int sh_interval = 100;
