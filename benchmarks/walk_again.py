@@ -7,7 +7,7 @@ Usage: benchmarks/walk_again.py build/release/photoslam SCRATCH [--metres 0.3] [
 
 The second lap swings around the first one: up to so many metres aside, half as far ahead or behind and a third up or down,
 and up to so many degrees to the side and half as many up. It sees the same surfaces. SCRATCH/again is a sequence for
-benchmarks/second_lap.py.
+benchmarks/second_lap.py; the folder must not be there yet.
 """
 import argparse
 import math
@@ -38,7 +38,8 @@ def main() -> None:
     a = parser.parse_args()
     a.scratch.mkdir(parents=True, exist_ok=True)
     first, walk = a.scratch / "first", a.scratch / "walk.txt"
-    call(a.program, "synth", "room", "--frames", LAP_FRAMES, "--format", "tum", "--output", first)
+    if not first.exists():
+        call(a.program, "synth", "room", "--frames", LAP_FRAMES, "--format", "tum", "--output", first)
     lap = [pose for _, pose in sorted(read_poses(first / "groundtruth.txt").items())]
     again = [beside(*pose, i / LAP_FRAMES, a.metres, a.degrees) for i, pose in enumerate(lap)]
     write_walk(lap + again, walk, RATE)

@@ -10,7 +10,7 @@ void FrameAlignment::project_landmarks(const SE3& camera_from_world, const MapSn
                                        const std::vector<KeyframeId>& keyframes, float radius_px,
                                        const FrameMatches& matches) {
   projector_.clear();
-  std::vector<bool> seen(static_cast<size_t>(map.num_landmarks));  // a bit each: most are long dead
+  std::vector<bool> seen(static_cast<size_t>(map.num_landmarks));  // a bit each: ids of the dead count, too
   for (size_t i = 0; i < matches.matched.size(); ++i) {
     LandmarkId id = matches.point[i].landmark;
     if (matches.matched[i] && map.find(id) != nullptr) seen[static_cast<size_t>(id.value)] = true;

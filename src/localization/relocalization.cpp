@@ -7,7 +7,7 @@
 
 namespace photoslam {
 void RelocalizationOptions::visit(OptionVisitor& v) {
-  v.value({"max_candidates", "", 1, 1000, "Keyframes tried per lost frame; more find the place sooner and cost time."},
+  v.value({"max_candidates", "", 1, 1000, "Keyframes tried per frame; more find the place sooner and cost time."},
           max_candidates);
   v.value({"min_matches", "", 6, 1000, "Descriptor matches a candidate needs."}, min_matches);
   v.value({"min_inliers", "", 6, 1000, "Landmarks that must fit the pose found; lower finds more, also wrong ones."},

@@ -57,18 +57,18 @@ void TrackerOptions::visit(OptionVisitor& v) {
           local_map_radius_px);
   v.value({"max_local_keyframes", "", 1, 1000, "Keyframes whose landmarks are searched in each frame."},
           max_local_keyframes);
-  v.value(
-      {"doubtful_share", "", 0.0, 1.0,
-       "A pose where less than this share of the landmarks that should be visible is found is doubted: the camera is "
-       "looked for in the whole map, and where more is found it is."},
-      doubtful_share);
+  v.value({"doubtful_share", "", 0.0, 1.0,
+           "A pose where less than this share of the landmarks that should be visible is found is none: the camera is "
+           "looked for in the whole map."},
+          doubtful_share);
   v.value({"recently_lost_s", "s", 0.0, 1000.0,
            "After this long without a pose the state is lost, and a separate map may begin."},
           recently_lost_s);
   v.group("initialization", "The first two views of a single camera.", initialization);
   v.group("pose_refinement", "Motion-only bundle adjustment, Eq. (1).", pose_refinement);
   v.group("keyframes", "When a frame becomes a keyframe.", keyframes);
-  v.group("relocalization", "Finding the map again after tracking was lost.", relocalization);
+  v.group("relocalization", "Finding the camera in the whole map, when tracking was lost or is doubted.",
+          relocalization);
 }
 
 Tracker::Tracker(const TrackerOptions& options, const OrbOptions& orb, const PinholeCamera& camera, double bf)
@@ -105,7 +105,7 @@ TrackingResult Tracker::track(const std::shared_ptr<const FeatureFrame>& frame, 
   }
 
   std::optional<Located> located = locate(*frame);
-  if (located && located->num_inliers >= options_.min_inliers) {
+  if (located && is_certain(*located)) {
     count_sightings(*located);
     return tracked(frame, std::move(*located), may_become_keyframe);
   }
@@ -118,16 +118,19 @@ TrackingResult Tracker::track(const std::shared_ptr<const FeatureFrame>& frame, 
   return lost(*frame, located ? "too few landmarks of the local map" : few);
 }
 
+bool Tracker::is_certain(const Located& located) const {
+  return located.num_inliers >= options_.min_inliers && located.share >= options_.doubtful_share;
+}
+
 /// Where the motion leads to; where the map looks like the frame, if nothing or too little of the map is found there.
 std::optional<Tracker::Located> Tracker::locate(const FeatureFrame& frame) {
   std::optional<Located> located;
   SE3 predicted;
   if (lost_frames_ == 0 && track_last_frame(frame, predicted)) located = track_local_map(frame, predicted, reference_);
-  const bool is_certain =
-      located && located->num_inliers >= options_.min_inliers && located->share >= options_.doubtful_share;
-  if (is_certain || !map_) return located;
+  if ((located && is_certain(*located)) || !map_) return located;
   if (const auto found = relocalizer_.relocalize(*map_, frame, reference_)) {
     Located elsewhere = track_local_map(frame, found->camera_from_world, found->keyframe);
+    elsewhere.is_relocalized = true;
     if (!located || elsewhere.num_inliers > located->num_inliers) located = std::move(elsewhere);
   }
   return located;
@@ -201,7 +204,7 @@ TrackingResult Tracker::tracked(const std::shared_ptr<const FeatureFrame>& frame
                                 bool may_become_keyframe) {
   const SE3& camera_from_world = located.camera_from_world;
   velocity_.reset();
-  if (located.reference != reference_) lost_frames_ = std::max(lost_frames_, 1);  // the last frame tells no velocity
+  if (located.is_relocalized) lost_frames_ = std::max(lost_frames_, 1);  // the last frame tells no velocity
   reference_ = located.reference;
   const auto elapsed = static_cast<double>(frame->timestamp_ns - last_->timestamp_ns);
   if (lost_frames_ == 0 && elapsed > 0) velocity_ = (camera_from_world * last_pose().inverse()).log() / elapsed;
@@ -302,7 +305,10 @@ bool Tracker::track_last_frame(const FeatureFrame& frame, SE3& camera_from_world
 
 Tracker::Located Tracker::track_local_map(const FeatureFrame& frame, const SE3& camera_from_world,
                                           KeyframeId reference) {
-  Located result{camera_from_world, reference, FrameMatches(frame.size()), 0, 1, {}};
+  Located result;
+  result.camera_from_world = camera_from_world;
+  result.reference = reference;
+  result.matches = FrameMatches(frame.size());
   MatchOptions match_options;
   match_options.max_ratio = 0.85;
   match_options.check_rotation = false;
@@ -326,7 +332,11 @@ Tracker::Located Tracker::track_local_map(const FeatureFrame& frame, const SE3& 
   alignment_.match(frame, match_options, result.matches);
 
   result.num_inliers = alignment_.refine(frame, result.matches, result.camera_from_world);
-  if (evidence.findable() > 0) result.share = static_cast<double>(result.num_inliers) / evidence.findable();
+  int found = 0;
+  for (size_t i = 0; i < frame.size(); ++i) {
+    found += result.matches.matched[i] && result.matches.point[i].landmark.valid();
+  }
+  if (evidence.findable() > 0) result.share = static_cast<double>(found) / evidence.findable();
   return result;
 }
 

@@ -28,7 +28,7 @@ struct TrackerOptions {
   double last_frame_radius_px = 12.0;
   double local_map_radius_px = 4.0;
   int max_local_keyframes = 25;
-  double doubtful_share = 0.1;
+  double doubtful_share = 0.08;
   double recently_lost_s = 2.0;
   MonoInitializerOptions initialization;
   PoseRefinementOptions pose_refinement;
@@ -80,8 +80,9 @@ class Tracker {
     KeyframeId reference;
     FrameMatches matches;
     int num_inliers = 0;
-    double share = 1;  ///< Inliers among the landmarks that could be found.
+    double share = 1;  ///< Of the landmarks that could be found, those that were; 1 where there are none.
     std::vector<LandmarkId> visible;
+    bool is_relocalized = false;
   };
 
   TrackingResult start_map(const std::shared_ptr<const FeatureFrame>& frame);
@@ -95,6 +96,7 @@ class Tracker {
   void resolve_last_matches();
   bool track_last_frame(const FeatureFrame& frame, SE3& camera_from_world);
   Located track_local_map(const FeatureFrame& frame, const SE3& camera_from_world, KeyframeId reference);
+  bool is_certain(const Located& located) const;
   std::optional<Located> locate(const FeatureFrame& frame);
   void count_sightings(const Located& located);
   std::vector<KeyframeId> local_keyframes(const SE3& camera_from_world) const;

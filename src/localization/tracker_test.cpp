@@ -28,6 +28,12 @@ class TrackerTest : public ::testing::Test {
     return result;
   }
 
+  /// Maps 75 frames; returns the last.
+  std::shared_ptr<const FeatureFrame> walk() {
+    for (int frame = 0; frame < 75; ++frame) step(frame, PointWorld::camera_from_world(frame / 30.0));
+    return world.observe(PointWorld::camera_from_world(74 / 30.0), 74);
+  }
+
   PointWorld world;
   Tracker tracker;
   IdealMapper mapper;
@@ -77,29 +83,39 @@ TEST_F(TrackerTest, LosesWithAReasonAndFindsTheMapAgain) {
   EXPECT_LT(pose_error(found.camera_from_world, truth).position, 1e-3);
 }
 
-TEST_F(TrackerTest, APoseWhereLittleOfTheMapIsFoundIsDoubted) {
-  // The camera is carried back to where it began, and a few things in its view come along.
-  std::shared_ptr<const FeatureFrame> last;
-  for (int frame = 0; frame < 75; ++frame) {
-    const SE3 pose = PointWorld::camera_from_world(frame / 30.0);
-    step(frame, pose);
-    last = world.observe(pose, frame);
-  }
-  const SE3 truth = PointWorld::camera_from_world(0);
-  auto carried = std::make_shared<FeatureFrame>(*world.observe(truth, 75));
+/// What a camera sees that was carried elsewhere, and 40 things of its last view that came along.
+std::shared_ptr<const FeatureFrame> carried(PointWorld& to, const SE3& pose, int id, const FeatureFrame& last) {
+  auto frame = std::make_shared<FeatureFrame>(*to.observe(pose, id));
   for (size_t i = 0; i < 40; ++i) {
-    const size_t along = i * last->size() / 40;
-    carried->features.keypoints.push_back(last->features.keypoints[along]);
-    carried->features.descriptors.push_back(last->features.descriptors[along]);
-    carried->depth.push_back(last->depth[along]);
-    carried->observations.push_back(last->observations[along]);
+    const size_t along = i * last.size() / 40;
+    frame->features.keypoints.push_back(last.features.keypoints[along]);
+    frame->features.descriptors.push_back(last.features.descriptors[along]);
+    frame->depth.push_back(last.depth[along]);
+    frame->observations.push_back(last.observations[along]);
   }
-  carried->grid.build(carried->features.keypoints, world.camera.width, world.camera.height);
+  frame->grid.build(frame->features.keypoints, to.camera.width, to.camera.height);
+  return frame;
+}
 
-  const TrackingResult result = tracker.track(carried, snapshot, false);
+TEST_F(TrackerTest, APoseWhereLittleOfTheMapIsFoundIsNone) {
+  const auto last = walk();
+  PointWorld unknown(77);
+  const TrackingResult away = tracker.track(carried(unknown, SE3{}, 75, *last), snapshot, true);
+  EXPECT_FALSE(away.has_pose) << away.num_inliers << " inliers where the camera was";
+
+  const SE3 truth = PointWorld::camera_from_world(0);
+  const TrackingResult back = tracker.track(carried(world, truth, 76, *last), snapshot, true);
+  ASSERT_TRUE(back.has_pose) << back.reason;
+  EXPECT_LT(pose_error(back.camera_from_world, truth).position, 1e-3);
+  EXPECT_GT(back.num_inliers, 200);
+}
+
+TEST_F(TrackerTest, ACameraCarriedBackIsNoticed) {
+  const auto last = walk();
+  const SE3 truth = PointWorld::camera_from_world(0);
+  const TrackingResult result = tracker.track(carried(world, truth, 75, *last), snapshot, false);
   ASSERT_TRUE(result.has_pose) << result.reason;
   EXPECT_LT(pose_error(result.camera_from_world, truth).position, 1e-3);
-  EXPECT_GT(result.num_inliers, 200);
 }
 
 TEST_F(TrackerTest, LostForLongItBeginsAnotherMapAndFindsTheOldOneAgain) {

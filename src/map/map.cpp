@@ -61,18 +61,18 @@ LandmarkId Map::living(LandmarkId id) const {
 /// nullptr: it is dead.
 Landmark* Map::mutable_landmark(LandmarkId id) {
   PHOTOSLAM_CHECK(id.valid() && static_cast<size_t>(id.value) < landmarks_.size(), "landmark {}", id.value);
-  has_changed(id);
+  mark_changed(id);
   return landmarks_.find(id);
 }
 
 void Map::bury(LandmarkId id) {
-  has_changed(id);
+  mark_changed(id);
   landmarks_.bury(id);
 }
 
 void Map::replace(LandmarkId id, LandmarkId by) {
-  has_changed(id);
-  if (const LandmarkId forgotten = landmarks_.replace(id, by); forgotten.valid()) has_changed(forgotten);
+  mark_changed(id);
+  if (const LandmarkId forgotten = landmarks_.replace(id, by); forgotten.valid()) mark_changed(forgotten);
 }
 
 Keyframe& Map::add_keyframe(KeyframeId id, std::shared_ptr<const FeatureFrame> frame, const SE3& camera_from_world) {
@@ -291,7 +291,7 @@ void Map::append(const Map& other) {
     count_on(by);
     replace(id, by);
   }
-  for (int i = num_landmarks; i < static_cast<int>(landmarks_.size()); ++i) has_changed(LandmarkId(i));
+  for (int i = num_landmarks; i < static_cast<int>(landmarks_.size()); ++i) mark_changed(LandmarkId(i));
 }
 
 void Map::count_sightings(LandmarkId id, int visible, int found) {
@@ -322,8 +322,11 @@ LandmarkChunk Map::chunk(int index) const {
   const int end = std::min(begin + LandmarkChunk::kSize, static_cast<int>(landmarks_.size()));
   for (int i = begin; i < end; ++i) {
     const LandmarkId id(i);
-    if (const Landmark* living = landmarks_.find(id)) result.add(i - begin, living->view);
-    if (const LandmarkId by = landmarks_.replacement(id); by.valid()) result.replace(i - begin, by);
+    if (const Landmark* living = landmarks_.find(id)) {
+      result.add(i - begin, living->view);
+    } else if (const LandmarkId by = landmarks_.replacement(id); by.valid()) {
+      result.replace(i - begin, by);
+    }
   }
   return result;
 }

@@ -83,7 +83,7 @@ class Map {
   Landmark* mutable_landmark(LandmarkId id);
   void bury(LandmarkId id);
   void replace(LandmarkId id, LandmarkId by);
-  void has_changed(LandmarkId id) { changed_chunks_.insert(id.value / LandmarkChunk::kSize); }
+  void mark_changed(LandmarkId id) { changed_chunks_.insert(id.value / LandmarkChunk::kSize); }
   LandmarkChunk chunk(int index) const;
 
   double scale_factor_;

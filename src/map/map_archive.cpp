@@ -50,9 +50,11 @@ void Map::serialize(Archive& a, int image_width, int image_height) {
     if (!a.reading()) continue;
     frame.grid.build(frame.features.keypoints, image_width, image_height);
     k.frame = std::make_shared<const FeatureFrame>(std::move(frame));
-    changed_keyframes_.insert(k.id);
   }
   if (a.reading()) {
+    changed_keyframes_.clear();
+    changed_chunks_.clear();
+    for (const Keyframe& k : keyframes_) changed_keyframes_.insert(k.id);
     anchors_.clear();
     for (const Keyframe& k : keyframes_) {
       if (k.culled) anchors_[k.parent].push_back(k.id);
@@ -60,7 +62,7 @@ void Map::serialize(Archive& a, int image_width, int image_height) {
   }
   a(landmarks_);
   if (!a.reading()) return;
-  for (int i = 0; i < static_cast<int>(landmarks_.size()); ++i) has_changed(LandmarkId(i));
+  for (int i = 0; i < static_cast<int>(landmarks_.size()); ++i) mark_changed(LandmarkId(i));
 }
 
 }  // namespace photoslam

@@ -90,6 +90,25 @@ TEST_F(MapTest, StaysConsistentUnderRandomOperations) {
   expect_consistent(map);
 }
 
+TEST_F(MapTest, WhatTheMapForgetsItsSnapshotForgets) {
+  const LandmarkId kept = map.add_landmark(Vec3(0, 0, 3), KeyframeId(0), 0);
+  const auto fuse_another = [&] {
+    const LandmarkId another = map.add_landmark(Vec3(0, 0, 3), KeyframeId(1), 0);
+    map.fuse(another, kept);
+    map.remove_observation(kept, KeyframeId(1));
+    return another;
+  };
+  const LandmarkId first = fuse_another();
+  for (size_t i = 1; i < LandmarkTable::kMaxReplacements; ++i) fuse_another();
+  LandmarkId found = first;
+  EXPECT_NE(map.snapshot()->find(found), nullptr);
+  EXPECT_EQ(map.living(first), kept);
+  fuse_another();
+  found = first;
+  EXPECT_EQ(map.snapshot()->find(found), nullptr);
+  EXPECT_FALSE(map.living(first).valid());
+}
+
 TEST_F(MapTest, AFusedLandmarkIsFoundThroughItsSuccessor) {
   const LandmarkId a = map.add_landmark(Vec3(0, 0, 3), KeyframeId(0), 0);
   const LandmarkId b = map.add_landmark(Vec3(0, 0, 3), KeyframeId(1), 0);
@@ -277,6 +296,10 @@ TEST_F(CorrectedMap, AnArchiveHoldsAllOfIt) {
   Archive saved;
   map.serialize(saved, world.camera.width, world.camera.height);
   Map loaded(2.0, 1);
+  for (int k = 0; k < 20; ++k) {  // of this nothing is left
+    loaded.add_keyframe(KeyframeId(k), world.observe(SE3{}, k), SE3{});
+    for (int i = 0; i < 20; ++i) loaded.add_landmark(Vec3(0, 0, 3), KeyframeId(k), i);
+  }
   Archive reader(saved.bytes());
   loaded.serialize(reader, world.camera.width, world.camera.height);
   EXPECT_TRUE(reader.at_end());
