@@ -64,6 +64,7 @@ class OpenLoop {
 };
 
 Status OpenLoop::measure(const std::filesystem::path& output) {
+  std::filesystem::create_directories(output);
   auto map = geometry_.snapshot();
   std::vector<Sim3> before;
   for (const auto& view : map->keyframes) {
