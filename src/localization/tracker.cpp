@@ -57,10 +57,10 @@ void TrackerOptions::visit(OptionVisitor& v) {
           local_map_radius_px);
   v.value({"max_local_keyframes", "", 1, 1000, "Keyframes whose landmarks are searched in each frame."},
           max_local_keyframes);
-  v.value({"doubtful_share", "", 0.0, 1.0,
+  v.value({"min_found_share", "", 0.0, 1.0,
            "A pose where less than this share of the landmarks that should be visible is found is none: the camera is "
            "looked for in the whole map."},
-          doubtful_share);
+          min_found_share);
   v.value({"recently_lost_s", "s", 0.0, 1000.0,
            "After this long without a pose the state is lost, and a separate map may begin."},
           recently_lost_s);
@@ -119,7 +119,7 @@ TrackingResult Tracker::track(const std::shared_ptr<const FeatureFrame>& frame, 
 }
 
 bool Tracker::is_certain(const Located& located) const {
-  return located.num_inliers >= options_.min_inliers && located.share >= options_.doubtful_share;
+  return located.num_inliers >= options_.min_inliers && located.share >= options_.min_found_share;
 }
 
 /// Where the motion leads to; where the map looks like the frame, if nothing or too little of the map is found there.

@@ -28,7 +28,7 @@ struct TrackerOptions {
   double last_frame_radius_px = 12.0;
   double local_map_radius_px = 4.0;
   int max_local_keyframes = 25;
-  double doubtful_share = 0.08;
+  double min_found_share = 0.08;
   double recently_lost_s = 2.0;
   MonoInitializerOptions initialization;
   PoseRefinementOptions pose_refinement;
