@@ -314,14 +314,15 @@ Tracker::Located Tracker::track_local_map(const FeatureFrame& frame, const SE3& 
   match_options.check_rotation = false;
   const auto radius = static_cast<float>(options_.local_map_radius_px);
   PlaceEvidence evidence(camera_.width, camera_.height, frame.features);
-  if (map_) {
-    const LandmarkProjector& projected = alignment_.projector();
-    alignment_.project_landmarks(camera_from_world, *map_, local_keyframes(camera_from_world), radius, result.matches);
+  const LandmarkProjector& projected = alignment_.projector();
+  const auto match_and_expect = [&] {
     alignment_.match(frame, match_options, result.matches);
-    for (size_t i = 0; i < projected.size(); ++i) {
-      result.visible.push_back(projected.point(i).landmark);
-      evidence.expect(projected.queries()[i].x, projected.queries()[i].y);
-    }
+    for (const auto& query : projected.queries()) evidence.expect(query.x, query.y);
+  };
+  if (map_) {
+    alignment_.project_landmarks(camera_from_world, *map_, local_keyframes(camera_from_world), radius, result.matches);
+    match_and_expect();
+    for (size_t i = 0; i < projected.size(); ++i) result.visible.push_back(projected.point(i).landmark);
   }
   // What the newest keyframes measured, until the map has landmarks for it.
   alignment_.projector().clear();
@@ -329,14 +330,10 @@ Tracker::Located Tracker::track_local_map(const FeatureFrame& frame, const SE3& 
     alignment_.projector().add(camera_from_world, {LandmarkId{}, seen, point}, by.features,
                                static_cast<size_t>(seen.keypoint), radius);
   });
-  alignment_.match(frame, match_options, result.matches);
+  match_and_expect();
 
   result.num_inliers = alignment_.refine(frame, result.matches, result.camera_from_world);
-  int found = 0;
-  for (size_t i = 0; i < frame.size(); ++i) {
-    found += result.matches.matched[i] && result.matches.point[i].landmark.valid();
-  }
-  if (evidence.findable() > 0) result.share = static_cast<double>(found) / evidence.findable();
+  if (evidence.findable() > 0) result.share = static_cast<double>(result.num_inliers) / evidence.findable();
   return result;
 }
 

@@ -80,7 +80,7 @@ class Tracker {
     KeyframeId reference;
     FrameMatches matches;
     int num_inliers = 0;
-    double share = 1;  ///< Of the landmarks that could be found, those that were; 1 where there are none.
+    double share = 1;  ///< Of the points that could be found, those that were; 1 where there are none.
     std::vector<LandmarkId> visible;
     bool is_relocalized = false;
   };

@@ -145,8 +145,19 @@ TEST_F(TrackerTest, PosesFollowACorrectionOfTheirReferenceKeyframe) {
   result = step(1, PointWorld::camera_from_world(1 / 30.0));
   ASSERT_TRUE(result.has_pose);
   EXPECT_EQ(result.reference, KeyframeId(0));
-  const SE3 final_pose = result.camera_from_reference * first;
-  EXPECT_LT(pose_error(final_pose, result.camera_from_world).position, 1e-9);
+  EXPECT_LT(pose_error(result.camera_from_reference * first, result.camera_from_world).position, 1e-9);
+
+  const SE3 moved(so3_exp(Vec3(0.1, -0.4, 0.05)), Vec3(2, 0.3, -1));
+  MapCorrection correction;
+  correction.new_world_from_old_world.assign(snapshot->keyframes.size(), Sim3(moved));
+  mapper.apply(correction);
+  snapshot = mapper.snapshot();
+  for (int frame = 2; frame < 5; ++frame) {
+    const SE3 truth = PointWorld::camera_from_world(frame / 30.0);
+    result = tracker.track(world.observe(truth, frame), snapshot, true);
+    ASSERT_TRUE(result.has_pose) << result.reason;
+    EXPECT_LT(pose_error(result.camera_from_world, truth * moved.inverse()).position, 1e-3);
+  }
 }
 
 TEST_F(TrackerTest, AKeyframeMayBeCulledBeforeItsPointsAreKnown) {

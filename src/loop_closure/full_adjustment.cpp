@@ -111,9 +111,10 @@ MapCorrection adjust_everything(const BundleOptions& options, const PinholeCamer
   const BundleProblem before = problem.bundle;
   RobustAdjustment adjustment(options, camera, bf);
   MapCorrection correction;
-  if (adjustment.solve(problem.bundle, interrupted)) correction.adjustment_is_due = false;
+  const bool is_done = adjustment.solve(problem.bundle, interrupted);
+  if (is_done) correction.adjustment_is_due = false;
   for (const auto& o : problem.bundle.observations) {
-    if (adjustment.fits(problem.bundle, o, 1.0)) continue;
+    if (!is_done || adjustment.fits(problem.bundle, o, 1.0)) continue;  // half way even what holds a loop does not fit
     correction.wrong_observations.emplace_back(problem.landmark_of_point[static_cast<size_t>(o.point)],
                                                KeyframeId(o.pose));
   }
