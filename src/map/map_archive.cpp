@@ -41,24 +41,21 @@ void serialize(Archive& a, LandmarkTable& table) {
 
 void Map::serialize(Archive& a, int image_width, int image_height) {
   a(scale_factor_, num_levels_, num_corrections_, adjustment_is_due_);
+  if (a.reading()) {
+    changed_keyframes_.clear();
+    changed_chunks_.clear();
+    anchors_.clear();
+  }
   keyframes_.resize(a.count(keyframes_.size()));
-  for (size_t i = 0; i < keyframes_.size(); ++i) {
-    Keyframe& k = keyframes_[i];
+  for (Keyframe& k : keyframes_) {
     FeatureFrame frame;
     if (!a.reading()) frame = *k.frame;
     a(k.id, frame, k.camera_from_world, k.landmarks, k.parent, k.scale, k.culled, k.from_parent);
     if (!a.reading()) continue;
     frame.grid.build(frame.features.keypoints, image_width, image_height);
     k.frame = std::make_shared<const FeatureFrame>(std::move(frame));
-  }
-  if (a.reading()) {
-    changed_keyframes_.clear();
-    changed_chunks_.clear();
-    for (const Keyframe& k : keyframes_) changed_keyframes_.insert(k.id);
-    anchors_.clear();
-    for (const Keyframe& k : keyframes_) {
-      if (k.culled) anchors_[k.parent].push_back(k.id);
-    }
+    changed_keyframes_.insert(k.id);
+    if (k.culled) anchors_[k.parent].push_back(k.id);
   }
   a(landmarks_);
   if (!a.reading()) return;

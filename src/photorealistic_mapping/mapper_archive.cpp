@@ -27,6 +27,13 @@ ImageU16 depth_of(const splatting::TargetImage& target) {
   return depth;
 }
 
+ImageU8 mask_of(const splatting::TargetImage& target) {
+  if (!target.has_mask()) return {};
+  ImageU8 mask(target.width(), target.height(), 1);
+  std::ranges::copy(target.mask(), mask.values().begin());
+  return mask;
+}
+
 }  // namespace
 
 void PoseAdjustment::serialize(Archive& a) { a(correction_, first_moment_, second_moment_, steps_); }
@@ -40,19 +47,26 @@ void KeyframeSchedule::serialize(Archive& a) {
   a(random_, uses_, losses_, active_, round_, revisits_, newest_came_last_);
 }
 
-void PhotorealisticMapper::serialize_view(Archive& a, TrainingView* view) {
-  ImageU8 color;
+/// `mask` is that of most views.
+void PhotorealisticMapper::serialize_view(Archive& a, const ImageU8& mask, TrainingView* view) {
+  ImageU8 color, own_mask;
   ImageU16 depth;
+  bool has_own_mask = false;
+  double depth_unit = 0;
   if (!a.reading() && view->has_images()) {
-    PHOTOSLAM_CHECK(std::ranges::equal(view->target.mask(), sensor_.mask.values()), "a mask of its own");
     color = color_of(view->target);
     depth = depth_of(view->target);
+    depth_unit = view->metres_per_depth_unit;
+    has_own_mask = !std::ranges::equal(view->target.mask(), mask.values());
+    if (has_own_mask) own_mask = mask_of(view->target);
   }
   serialize_image(a, color);
   serialize_image(a, depth);
+  a(depth_unit, has_own_mask);
+  serialize_image(a, own_mask);
   if (a.reading()) {
     view = &views_.emplace_back();
-    if (!color.empty()) set_images(color, depth, sensor_.mask, *view);
+    if (!color.empty()) set_images(color, depth, depth_unit, has_own_mask ? own_mask : mask, *view);
   }
   a(view->adjustment, view->exposure, view->exposure_is_known, view->lacks_depth);
   if (depth.empty()) serialize_image(a, view->picture.depth);  // otherwise it follows from the depth image
@@ -64,8 +78,10 @@ void PhotorealisticMapper::serialize(Archive& a) {
   uint64_t num_views = views_.size();
   a(random_, schedule_, model_, anchors_from_world_, anchor_scales_, scene_depth_, iteration_, training_psnr_,
     num_corrections_, num_views);
+  ImageU8 mask = sensor_.mask;
+  serialize_image(a, mask);
   if (a.reading()) views_.clear();
-  for (uint64_t i = 0; i < num_views; ++i) serialize_view(a, a.reading() ? nullptr : &views_[i]);
+  for (uint64_t i = 0; i < num_views; ++i) serialize_view(a, mask, a.reading() ? nullptr : &views_[i]);
 }
 
 }  // namespace photoslam

@@ -205,7 +205,8 @@ void PhotorealisticMapper::add_keyframe(const MapSnapshot& map, KeyframeId id, c
 /// Of the newest keyframe.
 void PhotorealisticMapper::add_pictures(const MapSnapshot& map, const KeyframeImages& images, Executor& executor) {
   const size_t index = views_.size() - 1;
-  set_images(images.color, images.depth, images.mask.empty() ? sensor_.mask : images.mask, views_[index]);
+  set_images(images.color, images.depth, sensor_.metres_per_depth_unit,
+             images.mask.empty() ? sensor_.mask : images.mask, views_[index]);
   if (!images.right.empty()) views_[index].right = shrink_color(images.right, kSeedingFactor);
   // A single camera's first keyframe has none before it to compare with: it gets its depth from the second.
   const auto active = schedule_.active();
@@ -257,12 +258,13 @@ void PhotorealisticMapper::keep_image_budget() {
   }
 }
 
-void PhotorealisticMapper::set_images(const ImageU8& color, const ImageU16& depth, const ImageU8& mask,
-                                      TrainingView& view) const {
+void PhotorealisticMapper::set_images(const ImageU8& color, const ImageU16& depth, double metres_per_depth_unit,
+                                      const ImageU8& mask, TrainingView& view) const {
   const CameraView full{sensor_.camera, color, depth, mask};
   view.target = {full.camera.width, full.camera.height, full.color.values(), full.mask.values()};
-  if (!depth.empty()) view.target.set_depth(depth.values(), static_cast<float>(sensor_.metres_per_depth_unit));
-  view.picture = make_picture(full, sensor_.metres_per_depth_unit);
+  if (!depth.empty()) view.target.set_depth(depth.values(), static_cast<float>(metres_per_depth_unit));
+  view.metres_per_depth_unit = metres_per_depth_unit;
+  view.picture = make_picture(full, metres_per_depth_unit);
 }
 
 void PhotorealisticMapper::seed_keyframe(const MapSnapshot& map, size_t view, Executor& executor) {

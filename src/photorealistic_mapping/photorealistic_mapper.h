@@ -148,8 +148,9 @@ class PhotorealisticMapper {
     bool exposure_is_known = false;  // from elsewhere; the map is not asked
     bool lacks_depth = false;        // wanted for seeding, but not to be had yet
     splatting::TargetImage target;
-    DepthPicture picture;  // half the size, for seeding
-    ImageU8 right;         // stereo: grey, half the size
+    double metres_per_depth_unit = 0;  // of the target
+    DepthPicture picture;              // half the size, for seeding
+    ImageU8 right;                     // stereo: grey, half the size
     bool has_images() const { return !target.empty(); }
     void drop_images();
   };
@@ -160,13 +161,14 @@ class PhotorealisticMapper {
   splatting::RenderOptions render_options(int factor) const;
   splatting::TrainOptions train_options(std::optional<double> progress, int factor) const;
   void add_pictures(const MapSnapshot& map, const KeyframeImages& images, Executor& executor);
-  void set_images(const ImageU8& color, const ImageU16& depth, const ImageU8& mask, TrainingView& view) const;
+  void set_images(const ImageU8& color, const ImageU16& depth, double metres_per_depth_unit, const ImageU8& mask,
+                  TrainingView& view) const;
   size_t nearest_with_exposure(size_t view) const;
   double megabytes(const TrainingView& view) const;
   void retire(size_t view);
   void release_culled(const MapSnapshot& map);
   void keep_image_budget();
-  void serialize_view(Archive& archive, TrainingView* view);
+  void serialize_view(Archive& archive, const ImageU8& mask, TrainingView* view);
   void hand_over_at(std::span<const int> seams, std::span<const Sim3> before, std::span<const Sim3> after);
   void rescale(size_t view, double factor);
   void seed_keyframe(const MapSnapshot& map, size_t view, Executor& executor);

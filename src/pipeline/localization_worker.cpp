@@ -46,6 +46,7 @@ FrameOutcome LocalizationWorker::process(FedFrame fed, const std::shared_ptr<con
   outcome.held_out = settings_.hold_out > 0 && frame.id.value % settings_.hold_out == settings_.hold_out - 1;
   outcome.queue_wait_ms = milliseconds(fed.queued, std::chrono::steady_clock::now());
   if (!frame.defect.empty()) {
+    outcome.state = TrackingState::lost;
     outcome.reason = frame.defect;
     return outcome;
   }

@@ -2,72 +2,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pipeline/session_file.h"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <limits>
 #include <optional>
 #include <string_view>
 
 #include "base/check.h"
 #include "base/checked_file.h"
+#include "io/packed_bytes.h"
 #include "photorealistic_mapping/image_archive.h"
 #include "pipeline/config.h"
 
 namespace photoslam {
 namespace {
 
-constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 10, .oldest = 10};
-
-/// Lets deflate or inflate work through the input; their counts have 32 bits.
-template <class Step>
-int feed(z_stream& stream, std::string_view in, char* out, size_t out_size, Step&& step) {
-  constexpr size_t kMost = std::numeric_limits<uInt>::max();
-  const char* const in_end = in.data() + in.size();
-  char* const out_end = out + out_size;
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(in.data()));
-  stream.next_out = reinterpret_cast<Bytef*>(out);
-  int status = Z_OK;
-  while (status == Z_OK) {
-    const auto in_left = static_cast<size_t>(in_end - reinterpret_cast<const char*>(stream.next_in));
-    stream.avail_in = static_cast<uInt>(std::min(in_left, kMost));
-    stream.avail_out =
-        static_cast<uInt>(std::min(static_cast<size_t>(out_end - reinterpret_cast<char*>(stream.next_out)), kMost));
-    status = step(&stream, in_left <= kMost ? Z_FINISH : Z_NO_FLUSH);
-  }
-  return status;
-}
-
-/// Size (8 bytes) and zlib stream. Pictures are stored as differences: entropy coding does nearly all there is to gain.
-std::string packed(std::string_view bytes) {
-  z_stream stream{};
-  PHOTOSLAM_CHECK(deflateInit2(&stream, 1, Z_DEFLATED, MAX_WBITS, 9, Z_RLE) == Z_OK, "zlib could not start");
-  const uint64_t size = bytes.size();
-  std::string result(sizeof(size) + deflateBound(&stream, bytes.size()), '\0');
-  std::memcpy(result.data(), &size, sizeof(size));
-  const int status = feed(stream, bytes, result.data() + sizeof(size), result.size() - sizeof(size), deflate);
-  result.resize(sizeof(size) + stream.total_out);
-  deflateEnd(&stream);
-  PHOTOSLAM_CHECK(status == Z_STREAM_END, "zlib failed to compress {} bytes", size);
-  return result;
-}
-
-/// What was packed; nothing if these bytes never were.
-std::optional<std::string> unpacked(std::string_view bytes) {
-  uint64_t size = 0;
-  z_stream stream{};
-  if (bytes.size() < sizeof(size) || inflateInit(&stream) != Z_OK) return std::nullopt;
-  std::memcpy(&size, bytes.data(), sizeof(size));
-  constexpr uint64_t kMostPerByte = 1032;  // no deflate stream grows by more
-  if (size / kMostPerByte > bytes.size()) return std::nullopt;
-  std::string result(size, '\0');
-  const int status = feed(stream, bytes.substr(sizeof(size)), result.data(), result.size(), inflate);
-  const bool whole = status == Z_STREAM_END && stream.total_out == size;
-  inflateEnd(&stream);
-  return whole ? std::optional(std::move(result)) : std::nullopt;
-}
+constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 11, .oldest = 11};
 
 /// Where a value that applies from now on does not reach what the map holds already.
 std::string_view what_stays(std::string_view key) {

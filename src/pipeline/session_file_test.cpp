@@ -9,6 +9,8 @@
 
 #include "base/check.h"
 #include "base/file.h"
+#include "photorealistic_mapping/world_export.h"
+#include "pipeline/loaded_session.h"
 #include "pipeline/system.h"
 #include "pipeline/testing/corner_source.h"
 
@@ -203,17 +205,7 @@ TEST_F(SessionTest, ASmallerBudgetOfGaussiansHoldsForTheLoadedMap) {
 }
 
 TEST_F(SessionTest, AnAdjustmentThatIsDueIsMadeWhenItIsContinued) {
-  struct Parts {
-    explicit Parts(const std::string& session) {
-      Archive reader(session);
-      reader(header, geometry, mapper);
-    }
-    const SourceInfo info = CornerSource(1).info();
-    SessionHeader header;
-    GeometryMapper geometry{{}, {}, info.camera, 1};
-    PhotorealisticMapper mapper{{}, {info.camera, info.metres_per_depth_unit}, 1};
-  };
-  Parts parts(*bytes);
+  LoadedSession parts({}, *bytes);
   EXPECT_FALSE(parts.geometry.snapshot()->adjustment_is_due);
   EXPECT_EQ(parts.header.num_settled, static_cast<int>(parts.mapper.num_keyframes()));
   const auto map = parts.geometry.correct({.adjustment_is_due = true});
@@ -229,9 +221,41 @@ TEST_F(SessionTest, AnAdjustmentThatIsDueIsMadeWhenItIsContinued) {
     EXPECT_EQ(run(0, at_once).failure, "");
     EXPECT_EQ(std::filesystem::exists(folder / "adjusted"), !localize_only);
   }
-  Parts adjusted(*read_session(folder / "adjusted"));
+  LoadedSession adjusted({}, *read_session(folder / "adjusted"));
   EXPECT_FALSE(adjusted.geometry.snapshot()->adjustment_is_due);
   EXPECT_EQ(adjusted.geometry.snapshot()->num_corrections, map->num_corrections + 1);
+}
+
+/// What training makes of it.
+GaussianTable trained(PhotorealisticMapper& mapper) {
+  ThreadPool executor{2};
+  for (int i = 0; i < 30; ++i) mapper.train(std::nullopt, executor);
+  const FrozenMap map = mapper.freeze();
+  return to_world(map.gaussians, map.anchors_from_world);
+}
+
+TEST_F(SessionTest, PicturesKeepTheirMaskAndTheirUnitOfDepth) {
+  LoadedSession same({}, *bytes), doubled({}, *bytes);
+  MapperSensor other = same.header.sensor;
+  other.metres_per_depth_unit *= 2;
+  other.mask = ImageU8(other.camera.width, other.camera.height, 1, 255);
+  std::fill_n(other.mask.values().begin(), other.mask.values().size() / 2, uint8_t{0});
+  PhotorealisticMapper elsewhere({}, other, 1);
+  Archive reader(*bytes);
+  reader(doubled.header, doubled.geometry, elsewhere);
+  // Also when its own sensor writes and reads it.
+  Archive saved;
+  saved(elsewhere);
+  PhotorealisticMapper again({}, other, 1);
+  Archive(saved.bytes())(again);
+
+  const GaussianTable expected = trained(same.mapper);
+  ASSERT_GT(expected.size(), 0u);
+  for (PhotorealisticMapper* mapper : {&elsewhere, &again}) {
+    const GaussianTable found = trained(*mapper);
+    ASSERT_EQ(found.size(), expected.size());
+    for (size_t i = 0; i < found.size(); ++i) ASSERT_TRUE(std::ranges::equal(found.row(i), expected.row(i))) << i;
+  }
 }
 
 TEST_F(SessionTest, TellsWhichOptionsDifferFromThoseItWasMadeWith) {

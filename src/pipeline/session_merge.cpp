@@ -7,26 +7,10 @@
 
 #include "map/connected_components.h"
 #include "map/map_spacing.h"
-#include "pipeline/session_file.h"
-#include "pipeline/session_maps.h"
+#include "pipeline/loaded_session.h"
 
 namespace photoslam {
 namespace {
-
-struct LoadedSession {
-  SessionHeader header;
-  GeometryMapper geometry;
-  PhotorealisticMapper mapper;
-
-  LoadedSession(const SystemOptions& options, const std::string& bytes)
-      : header(session_header(bytes)),
-        geometry(options.geometry_mapping, options.features, header.sensor.camera, header.bf),
-        mapper(options.photorealistic_mapping, header.sensor, /*seed=*/1) {
-    Archive reader(bytes);
-    SessionHeader again;
-    reader(again, geometry, mapper);
-  }
-};
 
 /// A session's keyframes may lie anywhere: moves it to where nothing of the other is in sight.
 void move_beside(const MapSnapshot& other, LoadedSession& session) {
@@ -49,7 +33,7 @@ Result<MergedSessions> merge_sessions(const SystemOptions& options, const std::s
                                       Executor& executor) {
   LoadedSession one(options, first), two(options, second);
   for (const auto& [session, which] : {std::pair{&one, "first"}, {&two, "second"}}) {
-    const Status maps = check_session_maps(session->geometry, session->mapper);
+    const Status maps = session->check();
     if (!maps) return error("the {} session cannot be continued: {}", which, maps.error().message);
   }
   if (Status fits = check_session_sensor(one.header, two.header.sensor.camera, two.header.bf); !fits) {

@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 #include "map/map_spacing.h"
-#include "pipeline/session_file.h"
+#include "pipeline/loaded_session.h"
 #include "pipeline/system.h"
 #include "pipeline/testing/corner_source.h"
 
@@ -42,23 +42,13 @@ class SessionMergeTest : public ::testing::Test {
   }
   /// Two walks that nobody has joined, in one session.
   std::string session_in_two_parts(int first_start, int second_start, int num_frames) {
-    LoadedParts one(session(first_start, num_frames)), two(session(second_start, num_frames));
+    LoadedSession one({}, session(first_start, num_frames)), two({}, session(second_start, num_frames));
     one.geometry.append(two.geometry);
     one.mapper.append(std::move(two.mapper));
     Archive both;
     both(one.header, one.geometry, one.mapper);
     return both.bytes();
   }
-  struct LoadedParts {
-    explicit LoadedParts(const std::string& bytes) {
-      Archive reader(bytes);
-      reader(header, geometry, mapper);
-    }
-    const SourceInfo info = CornerSource(1).info();
-    SessionHeader header;
-    GeometryMapper geometry{{}, {}, info.camera, 0.2 * info.camera.fx};
-    PhotorealisticMapper mapper{{}, {info.camera, info.metres_per_depth_unit}, 1};
-  };
 
   std::filesystem::path folder = std::filesystem::temp_directory_path() / fmt::format("photoslam-merge-{}", ::getpid());
   ThreadPool executor{2};
@@ -132,7 +122,7 @@ TEST_F(SessionMergeTest, PartsOfTheSecondThatMeetEachOtherOnlyAreNoMerge) {
 }
 
 TEST_F(SessionMergeTest, AMapBegunLaterLiesBesideAllParts) {
-  LoadedParts one(session(0, 20)), two(session(0, 20));
+  LoadedSession one({}, session(0, 20)), two({}, session(0, 20));
   // The part between them has been joined with the first.
   MapCorrection aside;
   aside.new_world_from_old_world.assign(two.geometry.map().num_keyframes(),
@@ -164,7 +154,7 @@ TEST_F(SessionMergeTest, AMapBegunLaterLiesBesideAllParts) {
 
 TEST_F(SessionMergeTest, MapsOfDifferentKeyframesAreRefused) {
   const std::string good = session(0, 20);
-  LoadedParts few(good), many(session(0, 60));
+  LoadedSession few({}, good), many({}, session(0, 60));
   ASSERT_NE(few.mapper.num_keyframes(), many.mapper.num_keyframes());
   Archive torn;
   torn(many.header, many.geometry, few.mapper);

@@ -253,8 +253,11 @@ void Session::add_keyframe(NewKeyframe keyframe) {
   const KeyframeProposal& proposal = keyframe.proposal;
   const auto interrupted = [this] { return !logical_time_ && geometry_stage_.backlog() > 0; };
   GeometryUpdate update = geometry_.process(proposal, interrupted);
-  if (logical_time_) {
-    while (const auto correction = loop_closer_.process(*update.map)) update.map = geometry_.correct(*correction);
+  const auto stopped = [this] { return stop_.stop_requested(); };
+  while (logical_time_ && !stopped()) {
+    const auto correction = loop_closer_.process(*update.map, stopped);
+    if (!correction) break;
+    update.map = geometry_.correct(*correction);
   }
   if (const auto& initial = proposal.initial) {
     deliver({update.map, initial->id, std::move(keyframe.initial_images), nullptr});
