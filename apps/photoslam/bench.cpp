@@ -48,9 +48,7 @@ Result<std::vector<splatting::BenchView>> load_views(const BenchArguments& argum
     if (!posed.distortion.none()) return error("{}: undistort the images first", arguments.cameras.string());
     ImageSize size{posed.camera.width, posed.camera.height};
     if (!arguments.size.empty()) {
-      const auto asked = parse_image_size(arguments.size);
-      if (!asked) return asked.error();
-      size = *asked;
+      size = parse_image_size(arguments.size);
     }
     if (size.width * posed.camera.height != size.height * posed.camera.width) {
       return error("--size {} changes the aspect of {}x{}", arguments.size, posed.camera.width, posed.camera.height);
@@ -163,11 +161,12 @@ void add_bench(CommandLine& line) {
   command.add_option("what", a.what, "What to measure: splat")->required()->check(CLI::IsMember({"splat"}));
   command.add_option("--model", a.model, "Gaussians: a PLY file")->required();
   command.add_option("--cameras", a.cameras, "Cameras and images: transforms.json")->required();
-  command.add_option("--size", a.size, "Image size WxH; default: that of the images");
+  command.add_option("--size", a.size, "Image size; default: that of the images")->type_name("WxH");
   command.add_option("--threads", a.threads, "Threads; 0: one per core")->check(CLI::Range(0, 1024));
   command.add_option("--zoom", a.zoom, "Multiplies the focal lengths")->check(CLI::Range(0.01, 1000.0));
   command.add_option("--rounds", a.rounds, "Training steps per camera")->check(CLI::Range(1, 100000));
-  command.add_option("--simd", a.simd, "SIMD target: AVX3, AVX2, SSE4 or NEON; default: the best this machine has");
+  command.add_option("--simd", a.simd, "SIMD target: AVX3, AVX2, SSE4 or NEON; default: the best this machine has")
+      ->type_name("NAME");
   a.backend.bind(command);
   command.add_flag("--json", a.json, "Print JSON");
   line.on_run(command, [arguments] { return bench_splat(*arguments); });

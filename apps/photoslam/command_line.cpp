@@ -49,6 +49,10 @@ std::string explain_leftover(const CLI::App& command, const std::vector<std::str
 
 }  // namespace
 
+void check_hold_out(int every) {
+  if (every == 1) throw CLI::ValidationError("--hold-out", "1 leaves nothing to map; 2 keeps every other image out");
+}
+
 CommandLine::CommandLine()
     : app_(
           "Real-time SLAM that leaves behind a photorealistic map of gaussians.\n"

@@ -16,6 +16,9 @@ inline constexpr int kExitOk = 0;
 inline constexpr int kExitFailure = 1;  ///< The work could not be done; one line on stderr says why.
 inline constexpr int kExitUsage = 2;    ///< The command line was wrong; nothing was started.
 
+/// Throws CLI::ValidationError for 1: with every frame held out nothing is left to map.
+void check_hold_out(int every);
+
 /// The words after `photoslam`: subcommands with their options, and what each of them does.
 class CommandLine {
  public:

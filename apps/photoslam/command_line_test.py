@@ -108,6 +108,20 @@ class UsageTest(CommandLineTest):
                 self.assert_fails(result, 2, option[0])
                 self.assert_nothing_written()
 
+    def test_options_that_contradict_each_other(self):
+        run = ("run", SEQUENCE, "--output", self.output)
+        for words, options in {
+            "--hold-out: 1": ("--hold-out", "1"),
+            "--refine-iterations": ("--deterministic", "--refine-seconds", "1"),
+            "nothing to refine": ("--load-map", self.folder, "--localize-only", "--refine-seconds", "1"),
+            "--camera excludes --fov": ("--camera", "a.yaml", "--fov", "60"),
+        }.items():
+            with self.subTest(words=words):
+                self.assert_fails(photoslam(*run, *options), 2, words)
+                self.assert_nothing_written()
+        self.assert_fails(photoslam("train", self.folder, "--hold-out", "1"), 2, "--hold-out: 1")
+        self.assert_fails(photoslam("train", self.folder), 1, self.folder)
+
     def test_synth_of_another_size(self):
         result = photoslam("synth", "room", "--frames", "1", "--size", "96x54", "--format", "replica", "--output",
                            self.output)
@@ -116,7 +130,7 @@ class UsageTest(CommandLineTest):
         self.assertEqual((camera["w"], camera["h"]), (96, 54))
         self.assertAlmostEqual(camera["fx"] / 96, 525.4 / 640, places=6)
         for size in ("96", "96x", "x54", "9x9", "96x54x3"):
-            self.assert_fails(photoslam("synth", "room", "--size", size, "--output", self.folder / "o"), 1, "--size")
+            self.assert_fails(photoslam("synth", "room", "--size", size, "--output", self.folder / "o"), 2, "--size")
 
     def test_doctor_finds_the_machine(self):
         result = photoslam("doctor")
@@ -184,7 +198,7 @@ class ConfigTest(CommandLineTest):
 
     def test_unknown_key_in_a_setting(self):
         result = photoslam("run", SEQUENCE, "--output", self.output, "--set", "pipeline.input_queu=7")
-        self.assert_fails(result, 1, "did you mean 'pipeline.input_queue'?")
+        self.assert_fails(result, 2, "--set", "did you mean 'pipeline.input_queue'?")
         self.assert_nothing_written()
 
     def test_missing_file(self):
@@ -225,6 +239,21 @@ class BadInputTest(CommandLineTest):
         result = photoslam("run", notes, "--output", self.output)
         self.assert_fails(result, 1, notes)
         self.assert_nothing_written()
+
+    def test_files_that_are_no_video(self):
+        words = self.folder / "words.txt"
+        words.write_text("some words\n" * 100, encoding="utf-8")
+        self.assert_fails(photoslam("run", words, "--fov", "60", "--output", self.output), 1, words)
+        poses = self.folder / "transforms.json"
+        poses.write_text("{}", encoding="utf-8")
+        self.assert_fails(photoslam("run", poses, "--output", self.output), 1, f"photoslam train {poses}")
+        self.assert_nothing_written()
+
+    def test_depth_in_another_unit(self):
+        sequence = self.copy_of_sequence()
+        camera = sequence / "camera.yaml"
+        camera.write_text(re.sub("depth_scale: .*", "depth_scale: 1", camera.read_text(encoding="utf-8")), encoding="utf-8")
+        self.assert_fails(photoslam("run", sequence, "--output", self.output, *FAST), 1, "depth.max_m", "depth_scale")
 
     def test_unparsable_list(self):
         sequence = self.copy_of_sequence()
@@ -397,6 +426,32 @@ class RunTest(CommandLineTest):
         self.assertAlmostEqual(json.loads(result.stdout)["ate"]["rot_rmse_deg"], report["ate"]["rot_rmse_deg"], places=5)
         self.assertAlmostEqual(json.loads(result.stdout)["image"]["psnr_db"], report["image"]["psnr_db"], delta=0.5)
 
+    def test_a_sequence_that_has_moved(self):
+        sequence = self.copy_of_sequence()
+        output = self.run_deterministic("run", sequence=sequence)
+        sequence.rename(self.folder / "moved")
+        self.assert_fails(photoslam("eval", output), 1, sequence, output / "run.json")
+        description = (output / "run.json").read_text(encoding="utf-8")
+        (output / "run.json").write_text(description.replace(str(sequence), str(self.folder / "moved")), encoding="utf-8")
+        self.assertEqual(photoslam("eval", output).returncode, 0)
+
+    def test_a_run_replaces_an_earlier_one_whole(self):
+        first = self.run_deterministic("run")
+        self.assertTrue((first / "session.photoslam").is_file())
+        result = photoslam("run", SEQUENCE, "--output", first, "--no-session", *FAST)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("will be replaced", result.stderr)
+        self.assertFalse((first / "session.photoslam").exists(), "it is not of this run")
+
+    def test_frames_lost_on_the_way_are_explained(self):
+        sequence = self.copy_of_sequence()
+        image = sorted((sequence / "rgb").iterdir())[4]
+        image.write_bytes(b"")
+        result = photoslam("run", sequence, "--output", self.output, "--deterministic")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stderr, rf"note: frame 4 is lost: .*{image.name}")
+        self.assertRegex((self.output / "frames.csv").read_text(encoding="utf-8"), rf"\n4,[^,]*,lost,[^\n]*{image.name}")
+
     def test_a_run_on_a_live_camera_is_not_read_again(self):
         output = self.run_deterministic("run")
         description = json.loads((output / "run.json").read_text(encoding="utf-8"))
@@ -439,7 +494,7 @@ class RunTest(CommandLineTest):
         run = self.run_deterministic("run", "--iterations-per-frame", "1")
         for count in ("10k", "1e4", "", "0", "-3", "99999999999", "10 "):
             result = photoslam("train", "--poses", run, "--init", f"random:{count}", "--output", self.output)
-            self.assert_fails(result, 1, f"--init random:{count}: expected random:COUNT")
+            self.assert_fails(result, 2, f"--init: random:{count}: expected random:COUNT")
             self.assert_nothing_written()
 
     def test_training_from_the_layouts_of_others(self):
@@ -532,6 +587,15 @@ class RunTest(CommandLineTest):
         self.assertTrue((self.output / "trajectory.tum").is_file())
         self.assertTrue((self.output / "map.ply").is_file())
 
+    def test_interrupted_training_saves_what_it_has(self):
+        run = self.run_deterministic("run")
+        command = [BINARY, "train", "--poses", str(run), "--output", str(self.output), "--seconds", "600", "--threads", "2"]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(3.0)
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(process.wait(timeout=60), 0)
+        self.assertTrue((self.output / "map.ply").is_file())
+
     def test_killed_run_leaves_no_partial_file(self):
         command = [BINARY, "run", str(SEQUENCE), "--output", str(self.output), "--refine-seconds", "120"]
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -606,6 +670,21 @@ class SessionTest(CommandLineTest):
         found = self.run_deterministic("found", "--load-map", both, "--localize-only")
         frames = json.loads((found / "report.json").read_text(encoding="utf-8"))["frames"]
         self.assertEqual(frames["tracked"], frames["total"])
+
+    def test_a_session_alone_can_be_looked_at(self):
+        """As a killed run leaves one."""
+        first = self.run_session()
+        alone = self.folder / "alone"
+        alone.mkdir()
+        shutil.copy(first / "session.photoslam", alone)
+        for number, source in enumerate((alone, alone / "session.photoslam")):
+            target = self.folder / "made" / f"{number}.ply"
+            result = photoslam("export", source, "--to", "ply", "--output", target)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual(sha256(target), sha256(first / "map.ply"))
+        result = photoslam("render", alone, "--orbit", "--orbit-frames", "2", "--output", self.output)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(len(list(self.output.glob("*.png"))), 2)
 
     def test_a_session_is_not_merged_with_something_else(self):
         first = self.run_session()

@@ -20,7 +20,9 @@ Result<SystemOptions> ConfigArguments::load() const {
     if (Status status = load_config(file, options); !status.ok()) return status.error();
   }
   for (const std::string& setting : settings) {
-    if (Status status = apply_setting(setting, options); !status.ok()) return status.error();
+    if (Status status = apply_setting(setting, options); !status.ok()) {
+      throw CLI::ValidationError("--set", status.error().message);
+    }
   }
   return options;
 }

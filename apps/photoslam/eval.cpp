@@ -165,6 +165,24 @@ Result<FinishedRun> read_run(const EvalArguments& arguments, const RunDescriptio
   return run;
 }
 
+/// All image figures but those of the map at the end of the input, which only the run had.
+void set_images(const std::vector<FrameScore>& scores, const FinishedRun& run, Report& report) {
+  const auto among = [&](const std::string& which) {
+    std::set<FrameId> chosen;
+    for (const FrameRecord& frame : run.log) {
+      if (is_chosen(frame, which, run.description.hold_out)) chosen.insert(frame.frame);
+    }
+    std::vector<FrameScore> some;
+    std::ranges::copy_if(scores, std::back_inserter(some),
+                         [&](const FrameScore& s) { return chosen.contains(s.frame); });
+    return summarize(some);
+  };
+  report.image = summarize(scores);
+  report.image_keyframes = among("keyframes");
+  report.image_held_out = among("held-out");
+  report.image_online = {};
+}
+
 Status eval(const EvalArguments& arguments) {
   HtmlReport html;
   auto report = read_report(arguments.folder / "report.json");
@@ -193,7 +211,7 @@ Status eval(const EvalArguments& arguments) {
   if (!arguments.table.empty()) {
     if (Status status = write_file_atomically(arguments.table, as_csv(*scores)); !status) return status;
   }
-  html.report.image = summarize(*scores);
+  set_images(*scores, *run, html.report);
   fmt::print("{}", arguments.json ? to_json(html.report) : result_table(html.report));
   return {};
 }

@@ -8,6 +8,7 @@
 #include "commands.h"
 #include "io/gaussian_spz.h"
 #include "io/image_file.h"
+#include "map_input.h"
 #include "run_images.h"
 #include "sources/posed_cameras.h"
 
@@ -54,12 +55,14 @@ Status export_cameras(const ExportArguments& arguments, const GaussianTable& map
 }
 
 Status export_map(const ExportArguments& arguments) {
-  const auto map = read_gaussian_ply(fs::is_directory(arguments.input) ? arguments.input / "map.ply" : arguments.input);
-  if (!map) return map.error();
-  if (arguments.to == "transforms" || arguments.to == "colmap") return export_cameras(arguments, *map);
-  const auto report = arguments.to == "spz"     ? write_gaussian_spz(arguments.output, *map)
-                      : arguments.to == "splat" ? write_gaussian_splat(arguments.output, *map)
-                                                : write_gaussian_ply(arguments.output, *map);
+  const auto input = read_map_input(arguments.input);
+  if (!input) return input.error();
+  const GaussianTable& map = input->map;
+  if (arguments.to == "transforms" || arguments.to == "colmap") return export_cameras(arguments, map);
+  if (Status status = prepare_output_folder(fs::absolute(arguments.output).parent_path()); !status) return status;
+  const auto report = arguments.to == "spz"     ? write_gaussian_spz(arguments.output, map)
+                      : arguments.to == "splat" ? write_gaussian_splat(arguments.output, map)
+                                                : write_gaussian_ply(arguments.output, map);
   if (!report) return report.error();
   std::error_code ignored;
   fmt::print("{} gaussians, {:.2f} MB: {}\n", report->written,
@@ -77,7 +80,7 @@ void add_export(CommandLine& line) {
                                "  photoslam export output/desk --to transforms --output desk-nerfstudio\n"
                                "  photoslam export map.ply --to splat --output map.splat\n");
   ExportArguments& a = *arguments;
-  command.add_option("map", a.input, "The output folder of a run, or a map.ply")->required();
+  command.add_option("map", a.input, "The output folder of a run, a map.ply or a session.photoslam")->required();
   command
       .add_option("--to", a.to,
                   "ply, spz, splat: the gaussians in one file; transforms, colmap: a folder with the keyframes' images "

@@ -4,15 +4,13 @@
 
 #include <string>
 
-#include "base/result.h"
-
 namespace photoslam {
 
 struct ImageSize {
   int width = 0, height = 0;
 };
 
-/// The value of --size: "480x640".
-Result<ImageSize> parse_image_size(const std::string& text);
+/// The value of --size: "480x640". Throws CLI::ValidationError for anything else.
+ImageSize parse_image_size(const std::string& text);
 
 }  // namespace photoslam

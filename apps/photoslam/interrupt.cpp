@@ -18,26 +18,30 @@ void say(std::string_view text) {
   if (::write(STDERR_FILENO, text.data(), text.size()) < 0) return;
 }
 
-void wait_for_signals(const std::stop_token& finished, std::stop_source& stop, const sigset_t& signals) {
+void wait_for_signals(const std::stop_token& finished, std::stop_source& stop, const sigset_t& signals,
+                      const char* consequence) {
   while (!finished.stop_requested()) {
     constexpr timespec kPoll{.tv_sec = 0, .tv_nsec = 100'000'000};
     if (sigtimedwait(&signals, nullptr, &kPoll) < 0) continue;
     if (stop.stop_requested()) ::_exit(kExitInterrupted);
-    say("\nphotoslam: stopping; saving what was made so far (press again to quit at once)\n");
+    say("\nphotoslam: stopping; ");
+    say(consequence);
+    say(" (press again to quit at once)\n");
     stop.request_stop();
   }
 }
 
 }  // namespace
 
-InterruptGuard::InterruptGuard() {
+InterruptGuard::InterruptGuard(const char* consequence) {
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  waiter_ =
-      std::jthread([this, signals](const std::stop_token& finished) { wait_for_signals(finished, stop_, signals); });
+  waiter_ = std::jthread([this, signals, consequence](const std::stop_token& finished) {
+    wait_for_signals(finished, stop_, signals, consequence);
+  });
 }
 
 }  // namespace photoslam

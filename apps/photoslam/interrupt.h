@@ -7,11 +7,12 @@
 
 namespace photoslam {
 
-/// Turns Ctrl-C and SIGTERM into a stop request, so that what was made so far is saved; a second one ends the process
-/// at once. Create it before any other thread: threads inherit the blocked signals.
+/// Turns Ctrl-C and SIGTERM into a stop request; a second one ends the process at once. Create it before any other
+/// thread: threads inherit the blocked signals.
 class InterruptGuard {
  public:
-  InterruptGuard();
+  /// What the user is told to happen next, in static memory.
+  explicit InterruptGuard(const char* consequence = "saving what was made so far");
   std::stop_token token() const { return stop_.get_token(); }
 
  private:

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <memory>
-#include <numbers>
 #include <thread>
 
 #include "backend_arguments.h"
@@ -13,12 +12,13 @@
 #include "commands.h"
 #include "evaluation/map_scoring.h"
 #include "image/convert.h"
-#include "io/gaussian_ply.h"
 #include "io/image_file.h"
 #include "io/npy_file.h"
+#include "map_input.h"
+#include "orbit.h"
 #include "photorealistic_mapping/view_geometry.h"
-#include "run_folder.h"
-#include "sources/camera_file.h"
+#include "photorealistic_mapping/world_export.h"
+#include "sources/calibration/calibration.h"
 #include "sources/posed_cameras.h"
 
 namespace photoslam {
@@ -38,52 +38,28 @@ struct RenderArguments {
   BackendArguments backend;
 };
 
-/// A horizontal circle around the middle of the map, looking inwards.
-std::vector<SE3> orbit(const GaussianTable& map, int num_frames) {
-  const auto quantile = [&](size_t axis, double share) {
-    std::vector<double> values;
-    for (size_t i = 0; i < map.size(); ++i) values.push_back(static_cast<double>(map.row(i)[axis]));
-    const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    return *at;
-  };
-  const Vec3 center(quantile(0, 0.5), quantile(1, 0.5), quantile(2, 0.5));
-  const double extent = std::max(quantile(0, 0.9) - quantile(0, 0.1), quantile(2, 0.9) - quantile(2, 0.1));
-  std::vector<SE3> poses;
-  for (int i = 0; i < num_frames; ++i) {
-    const double angle = 2.0 * std::numbers::pi * i / num_frames;
-    const Vec3 position = center + 0.5 * extent * Vec3(std::sin(angle), -0.3, -std::cos(angle));
-    const Vec3 forward = (center - position).normalized();
-    const Vec3 right = Vec3::UnitY().cross(forward).normalized();  // the world's y points down
-    Mat3 world_from_camera;
-    world_from_camera << right, forward.cross(right), forward;
-    poses.push_back(SE3(Quat(world_from_camera), position).inverse());
-  }
-  return poses;
-}
-
 /// The calibration to render with: --camera, else that of the run.
-Result<PinholeCamera> choose_camera(const RenderArguments& arguments) {
+Result<PinholeCamera> choose_camera(const RenderArguments& arguments, const MapInput& input) {
   if (!arguments.camera.empty()) {
-    const auto file = read_camera_yaml(arguments.camera);
+    const auto file = read_calibration(arguments.camera);
     if (!file) return file.error();
-    return file->camera;
+    if (file->camera.width > 0) return file->camera;
+    return error("{} does not tell the size of the images; write a camera.yaml with width and height",
+                 arguments.camera.string());
   }
-  if (fs::is_directory(arguments.map)) {
-    const auto description = read_run_description(arguments.map);
-    if (!description) return description.error();
-    return description->camera;
-  }
-  return error("--trajectory and --orbit of a map file need --camera camera.yaml");
+  if (input.camera) return *input.camera;
+  return error("{}: not the folder of a run or a session: --trajectory and --orbit need --camera camera.yaml",
+               arguments.map.string());
 }
 
-Result<std::vector<PosedCamera>> choose_views(const RenderArguments& arguments, const GaussianTable& map) {
+Result<std::vector<PosedCamera>> choose_views(const RenderArguments& arguments, const MapInput& input) {
   if (!arguments.cameras.empty()) return read_transforms_json(arguments.cameras);
-  const auto camera = choose_camera(arguments);
+  const auto camera = choose_camera(arguments, input);
   if (!camera) return camera.error();
   std::vector<PosedCamera> views;
   if (arguments.orbit) {
-    for (const SE3& pose : orbit(map, arguments.orbit_frames)) views.push_back({*camera, pose, {}});
+    for (const SE3& pose : orbit(input.map, input.keyframes, arguments.orbit_frames))
+      views.push_back({*camera, pose, {}});
     return views;
   }
   const auto trajectory = read_tum_trajectory(arguments.trajectory);
@@ -101,15 +77,15 @@ Status write_view(const RenderArguments& arguments, size_t index, const splattin
 Status render(const RenderArguments& arguments) {
   const int chosen = !arguments.cameras.empty() + !arguments.trajectory.empty() + arguments.orbit;
   if (chosen != 1) throw CLI::ValidationError("give one of --cameras, --trajectory and --orbit");
-  const auto map = read_gaussian_ply(fs::is_directory(arguments.map) ? arguments.map / "map.ply" : arguments.map);
-  if (!map) return map.error();
-  const auto views = choose_views(arguments, *map);
+  const auto input = read_map_input(arguments.map);
+  if (!input) return input.error();
+  const auto views = choose_views(arguments, *input);
   if (!views) return views.error();
   if (Status status = prepare_output_folder(arguments.output); !status) return status;
   const auto gpu = arguments.backend.open();
   if (!gpu) return gpu.error();
 
-  const splatting::GaussianModel model = from_world(*map);
+  const splatting::GaussianModel model = from_world(input->map);
   const std::vector<SE3> world = {SE3{}};
   ThreadPool executor(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
   splatting::Renderer renderer(*gpu);
@@ -125,7 +101,7 @@ Status render(const RenderArguments& arguments) {
     if (Status status = write_view(arguments, i, result); !status) return status;
   }
   report_failure(gpu->get());
-  fmt::print("{} images of {} gaussians in {}, {:.1f} ms each to render\n", views->size(), map->size(),
+  fmt::print("{} images of {} gaussians in {}, {:.1f} ms each to render\n", views->size(), input->map.size(),
              arguments.output.string(), render_ms / static_cast<double>(views->size()));
   return {};
 }
@@ -140,11 +116,12 @@ void add_render(CommandLine& line) {
                "  photoslam render output/desk --trajectory output/desk/trajectory.tum --output frames\n"
                "  photoslam render map.ply --cameras transforms.json --format npy --output views\n");
   RenderArguments& a = *arguments;
-  command.add_option("map", a.map, "map.ply, or the output folder of a run")->required();
+  command.add_option("map", a.map, "map.ply, session.photoslam, or the output folder of a run")->required();
   command.add_option("--cameras", a.cameras, "Cameras to draw from: transforms.json; distortion is left out");
   command.add_option("--trajectory", a.trajectory, "Poses to draw from: TUM lines");
-  command.add_option("--camera", a.camera, "camera.yaml for --trajectory and --orbit; default: that of the run");
-  command.add_flag("--orbit", a.orbit, "Circle around the middle of the map");
+  command.add_option("--camera", a.camera,
+                     "Calibration for --trajectory and --orbit, any that run reads; default: that of the run");
+  command.add_flag("--orbit", a.orbit, "Around what the run looked at or, where it looked around, along its walk");
   command.add_option("--orbit-frames", a.orbit_frames, "Images of the orbit")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();

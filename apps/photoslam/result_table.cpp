@@ -53,9 +53,10 @@ std::string result_table(const Report& report) {
     table.line("  over 1 s", "RPE {:.2f} cm, {:.2f} deg", 100 * *report.rpe.trans_m, report.rpe.rot_deg.value_or(0));
   }
   if (report.mapping.iterations) {
-    table.line("map", "{} gaussians, {} keyframes, {} iterations ({:.1f} ms each)",
-               report.mapping.gaussians.value_or(0), report.mapping.keyframes.value_or(0), *report.mapping.iterations,
-               report.mapping.ms_per_iteration.value_or(0));
+    const auto& m = report.mapping;
+    table.line("map", "{} gaussians, {} keyframes, {} training iterations in {:.1f} s", m.gaussians.value_or(0),
+               m.keyframes.value_or(0), *m.iterations,
+               m.seconds_online.value_or(0) + m.seconds_drain.value_or(0) + m.seconds_refine.value_or(0));
   }
   add_images(table, "images online", report.image_online);
   add_images(table, "images", report.image);

@@ -22,6 +22,7 @@
 #include "progress_line.h"
 #include "result_table.h"
 #include "run_folder.h"
+#include "run_notes.h"
 #include "sources/ground_truth.h"
 #include "sources/sensor_choice.h"
 
@@ -59,11 +60,21 @@ Status configure(const RunArguments& arguments, SystemOptions& options, RunSetti
   settings.preview = !arguments.preview.empty();
   if (arguments.map_until_s >= 0) settings.map_until_s = arguments.map_until_s;
   if (settings.deterministic || settings.logical_time || arguments.pace == "asap") settings.pace = Pace::asap;
-  if (settings.deterministic && settings.refine_seconds > 0) {
-    return error("--refine-seconds depends on the clock; with --deterministic use --refine-iterations");
-  }
   if (!arguments.no_session) settings.session_file = arguments.output / "session.photoslam";
   return {};
+}
+
+/// Combinations of options that contradict each other.
+void check_combinations(const RunArguments& arguments) {
+  const RunSettings& settings = arguments.settings;
+  check_hold_out(settings.hold_out);
+  if (settings.deterministic && settings.refine_seconds > 0) {
+    throw CLI::ValidationError("--refine-seconds",
+                               "depends on the clock; with --deterministic use --refine-iterations");
+  }
+  if (settings.localize_only && (settings.refine_seconds > 0 || settings.refine_iterations > 0)) {
+    throw CLI::ValidationError("--localize-only", "leaves the map as it is: there is nothing to refine");
+  }
 }
 
 Status load_session(const fs::path& path, const SystemOptions& options, const SourceInfo& info, RunSettings& settings) {
@@ -86,6 +97,29 @@ void announce(const SourceInfo& info, const RunArguments& arguments) {
              arguments.source.sensor ? "" : " (guessed from the data; --sensor tells)");
   for (const std::string& note : info.notes) fmt::print(stderr, "  note: {}\n", note);
   fmt::print(stderr, "writing to {}\n", arguments.output.string());
+}
+
+bool has_session(const fs::path& folder) { return fs::exists(folder / "session.photoslam"); }
+
+/// Whether the map that is continued is the one in the output folder.
+bool continues_in_place(const RunArguments& arguments) {
+  std::error_code ignored;
+  if (arguments.load_map.empty()) return false;
+  const fs::path map = fs::absolute(arguments.load_map);
+  return fs::equivalent(fs::is_directory(map) ? map : map.parent_path(), arguments.output, ignored);
+}
+
+/// What an earlier run has left in the folder goes as this one's results come, its session too.
+void announce_replacement(const RunArguments& arguments) {
+  if (continues_in_place(arguments)) return;
+  if (has_session(arguments.output) || fs::exists(arguments.output / "map.ply"))
+    fmt::print(stderr, "  note: the results of an earlier run in {} will be replaced\n", arguments.output.string());
+}
+
+void remove_replaced_session(const RunArguments& arguments, const RunSettings& settings) {
+  std::error_code ignored;
+  const bool writes_one = !settings.session_file.empty() && !settings.localize_only;
+  if (!writes_one && !continues_in_place(arguments)) fs::remove(arguments.output / "session.photoslam", ignored);
 }
 
 /// What is left of a camera after the run: nothing to compare the map with.
@@ -113,6 +147,7 @@ Status save_and_evaluate(const RunArguments& arguments, const SystemOptions& opt
   size_t map_bytes = 0;
   if (Status status = write_run_description(arguments.output, description); !status) return status;
   if (Status status = write_run_results(arguments.output, run, map_bytes); !status) return status;
+  remove_replaced_session(arguments, settings);
 
   auto source = reopen(arguments.dataset, description.source, info);
   if (!source) return source.error();
@@ -129,6 +164,9 @@ Status save_and_evaluate(const RunArguments& arguments, const SystemOptions& opt
   ThreadPool executor(std::max(1, threads));
   fmt::print(stderr, "measuring\n");
   HtmlReport html = evaluate_run(run, options, **source, truth, !run.interrupted, executor);
+  if (truth && !html.report.ate.rmse_m) {
+    fmt::print(stderr, "  note: no trajectory error: fewer than three true poses within 20 ms of those of the run\n");
+  }
   html.report.map.size_mb = 1e-6 * static_cast<double>(map_bytes);
   if (settings.gpu) html.report.machine += "; GPU " + settings.gpu->name();
   if (Status status = write_report(arguments.output / "report.json", html.report); !status) return status;
@@ -139,6 +177,7 @@ Status save_and_evaluate(const RunArguments& arguments, const SystemOptions& opt
 }
 
 Status run(const RunArguments& arguments) {
+  const InterruptGuard interrupt;  // before a camera or a GPU begins a thread
   SystemOptions options;
   RunSettings settings;
   if (Status status = configure(arguments, options, settings); !status) return status;
@@ -148,11 +187,11 @@ Status run(const RunArguments& arguments) {
   if (Status status = load_session(arguments.load_map, options, info, settings); !status) return status;
   if (Status status = prepare_output_folder(arguments.output); !status) return status;
   announce(info, arguments);
+  announce_replacement(arguments);
   auto gpu = arguments.backend.open();
   if (!gpu) return gpu.error();
   settings.gpu = *gpu;
 
-  InterruptGuard interrupt;
   RunOutcome outcome;
   {
     ProgressLine line;
@@ -164,14 +203,14 @@ Status run(const RunArguments& arguments) {
     if (!preview.failure().empty()) fmt::print(stderr, "  note: no preview: {}\n", preview.failure());
   }
   for (const std::string& message : outcome.messages) fmt::print(stderr, "  note: {}\n", message);
+  for (const std::string& note : notes_on(outcome, settings)) fmt::print(stderr, "  note: {}\n", note);
   report_failure(gpu->get());
   if (outcome.gpu && !outcome.gpu->undistortion_failure.empty()) {
     fmt::print(stderr, "  note: the GPU has failed to undistort ({}); from then on the CPU did it\n",
                outcome.gpu->undistortion_failure);
   }
   if (outcome.final.keyframes_from_world.empty()) {
-    const std::string why = outcome.frames.empty() ? "no frame was read" : outcome.frames.back().reason;
-    return error("nothing could be mapped: {}{}", why, outcome.failure.empty() ? "" : " (" + outcome.failure + ")");
+    return error("nothing could be mapped: {}", why_nothing_was_mapped(outcome, info.sensor));
   }
   if (Status status = save_and_evaluate(arguments, options, settings, info, outcome); !status) return status;
   if (!outcome.failure.empty()) return error("{}; what was made so far is saved", outcome.failure);
@@ -202,12 +241,14 @@ void add_run(CommandLine& line) {
   command.add_option("--format", a.source.format, "Layout of the sequence")
       ->check(CLI::IsMember(formats))
       ->capture_default_str();
-  command.add_option("--camera", a.source.camera,
-                     "Calibration to use instead of the sequence's own: camera.yaml, OpenCV, ORB-SLAM, "
-                     "EuRoC's sensor.yaml or KITTI's calib.txt");
+  CLI::Option* calibration =
+      command.add_option("--camera", a.source.camera,
+                         "Calibration to use instead of the sequence's own: camera.yaml, OpenCV, ORB-SLAM, "
+                         "EuRoC's sensor.yaml or KITTI's calib.txt");
   command
       .add_option("--fov", a.source.fov_deg, "Without a calibration: guess one of this horizontal field of view [deg]")
-      ->check(CLI::Range(5.0, 170.0));
+      ->check(CLI::Range(5.0, 170.0))
+      ->excludes(calibration);
   command.add_option("--fps", a.source.frames_per_second, "Rate of the images of a folder [Hz]")
       ->check(CLI::Range(0.01, 10000.0));
   command.add_option("--output", a.output, "Folder for the results")->capture_default_str();
@@ -247,6 +288,7 @@ void add_run(CommandLine& line) {
   line.on_run(command, [arguments]() -> Status {
     const auto sensor = parse_sensor(arguments->sensor);
     if (!sensor) return sensor.error();
+    check_combinations(*arguments);
     arguments->source.sensor = *sensor;
     return run(*arguments);
   });

@@ -66,6 +66,12 @@ Result<std::unique_ptr<FrameSource>> open_run_source(const fs::path& folder, con
         "video, then run and measure that",
         folder.string(), description.dataset.string());
   }
+  std::error_code ignored;
+  if (!fs::exists(description.dataset, ignored)) {
+    return error(
+        "{}, the sequence of this run, does not exist any more; where it has moved, write its new place into {}",
+        description.dataset.string(), (folder / "run.json").string());
+  }
   return open_source(description.dataset, description.source);
 }
 

@@ -93,8 +93,9 @@ Result<std::vector<splatting::Gaussian>> initial_gaussians(const TrainArguments&
     int count = 0;
     const auto read = std::from_chars(arguments.init.data() + 7, end, count);
     if (read.ec != std::errc{} || read.ptr != end || count < 1 || count > kMostRandom) {
-      return error("--init {}: expected random:COUNT, a whole number from 1 to {}, as in random:10000", arguments.init,
-                   kMostRandom);
+      throw CLI::ValidationError(
+          "--init", fmt::format("{}: expected random:COUNT, a whole number from 1 to {}, as in random:10000",
+                                arguments.init, kMostRandom));
     }
     return random_gaussians(input, count, arguments.seed);
   }
@@ -141,8 +142,8 @@ void train_until_done(const TrainArguments& arguments, const std::stop_token& st
   }
 }
 
-/// Renders every picture from the trained map; writes the pairs, render beside truth, and prints the figures. A picture
-/// that was held out has the exposure of the one before it: nothing is learnt from it.
+/// Renders every picture from the trained map; writes the pairs, photo left and render right, and prints the figures. A
+/// picture that was held out has the exposure of the one before it: nothing is learnt from it.
 Status score(const TrainArguments& arguments, const PosedImages& input, const FrozenMap& map, Executor& executor) {
   splatting::Renderer renderer;
   splatting::RenderResult result;
@@ -164,8 +165,8 @@ Status score(const TrainArguments& arguments, const PosedImages& input, const Fr
     ImageU8 pair(2 * input.camera.width, input.camera.height, 3);
     const ImageU8 drawn = to_u8(render);
     for (int y = 0; y < pair.height(); ++y) {
-      std::copy_n(drawn.row(y), 3 * drawn.width(), pair.row(y));
-      std::copy_n(input.images[i].row(y), 3 * drawn.width(), pair.row(y) + 3 * drawn.width());
+      std::copy_n(input.images[i].row(y), 3 * drawn.width(), pair.row(y));
+      std::copy_n(drawn.row(y), 3 * drawn.width(), pair.row(y) + 3 * drawn.width());
     }
     if (Status status = write_png(pairs / fmt::format("{:06}.png", i), pair); !status) return status;
   }
@@ -193,9 +194,11 @@ Result<size_t> write_map(const TrainArguments& arguments, const PosedImages& inp
 }
 
 Status train(const TrainArguments& arguments) {
+  const InterruptGuard interrupt;  // before any other thread begins
   if (arguments.input.empty() == arguments.run.empty()) {
     throw CLI::ValidationError("give either posed images or --poses RUN");
   }
+  check_hold_out(arguments.hold_out);
   Result<SystemOptions> options = arguments.config.load();
   if (!options) return options.error();
   const auto input = arguments.run.empty() ? read_posed_images(arguments.input) : read_keyframes_of_run(arguments.run);
@@ -223,7 +226,6 @@ Status train(const TrainArguments& arguments) {
                input->num_resampled);
   }
 
-  const InterruptGuard interrupt;
   PhotorealisticMapper mapper(options->photorealistic_mapping, {.camera = input->camera}, arguments.seed, *gpu);
   int32_t keyframe = 0;
   for (size_t i = 0; i < input->images.size(); ++i) {
@@ -259,7 +261,8 @@ void add_train(CommandLine& line) {
   TrainArguments& a = *arguments;
   command.add_option("images", a.input, "transforms.json, or a folder with one or with a COLMAP model");
   command.add_option("--poses", a.run, "Take images and poses of the keyframes of a run instead");
-  command.add_option("--output", a.output, "Folder for map.ply and the pairs")->capture_default_str();
+  command.add_option("--output", a.output, "Folder for map.ply and pairs/ (photo left, render right)")
+      ->capture_default_str();
   command
       .add_option(
           "--init", a.init,

@@ -10,6 +10,7 @@ extern "C" {
 
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <memory>
 
 #include "sources/video/video_plugin.h"
@@ -58,6 +59,7 @@ void* open_reader(const char* path, PhotoslamVideoInfo* info, char* error, int s
   reader->format.reset(format);
   if (code >= 0) code = avformat_find_stream_info(format, nullptr);
   if (code < 0) return explain(error, size, "cannot be opened as a video", code), nullptr;
+  if (std::strcmp(format->iformat->name, "tty") == 0) return explain(error, size, "is text, not a video", 0), nullptr;
   const AVCodec* decoder = nullptr;
   const int index = av_find_best_stream(format, AVMEDIA_TYPE_VIDEO, -1, -1, &decoder, 0);
   if (index < 0 || decoder == nullptr) return explain(error, size, "holds no video that can be decoded", 0), nullptr;

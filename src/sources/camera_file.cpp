@@ -3,6 +3,7 @@
 #include "sources/camera_file.h"
 
 #include <array>
+#include <cmath>
 #include <string>
 
 #include "sources/calibration/coefficients.h"
@@ -46,6 +47,10 @@ Result<CameraFile> read_camera_yaml(const std::filesystem::path& path) {
   file.frames_per_second = map.optional_number("fps", 1e-3, 1e5);
   file.depth_scale = map.optional_number("depth_scale", 1e-6, 1e9);
   if (const Status status = map.status(); !status) return status.error();
+  const PinholeCamera& c = file.camera;
+  if (std::abs(c.cx - 0.5 * c.width) > c.width || std::abs(c.cy - 0.5 * c.height) > c.height) {
+    return error("{}: cx {}, cy {} lie far outside of an image of {}x{}", path.string(), c.cx, c.cy, c.width, c.height);
+  }
   return file;
 }
 

@@ -89,6 +89,10 @@ Result<std::unique_ptr<FrameSource>> open_source(const fs::path& path, const Sou
   std::error_code ignored;
   const bool as_video = options.format == kVideo;
   if (fs::is_regular_file(path, ignored) && (as_video || options.format == "auto")) {
+    if (path.extension() == ".json") {
+      return error("{} is not a video; images whose poses are known are mapped with: photoslam train {}", path.string(),
+                   path.string());
+    }
     return internal::open_video(path, options);
   }
   if (fs::is_directory(path, ignored) && as_video) return error("{} is a folder; a video is a file", path.string());

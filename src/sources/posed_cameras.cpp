@@ -104,7 +104,7 @@ Result<std::vector<PosedCamera>> read_transforms_json(const std::filesystem::pat
     if (cameras.empty()) return error("{}: no frames", path.string());
     return cameras;
   } catch (const json::exception& e) {
-    return error("{}: {}", path.string(), e.what());
+    return error("{}: expected a transforms.json: {}", path.string(), e.what());
   }
 }
 
