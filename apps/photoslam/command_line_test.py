@@ -252,7 +252,8 @@ class BadInputTest(CommandLineTest):
     def test_depth_in_another_unit(self):
         sequence = self.copy_of_sequence()
         camera = sequence / "camera.yaml"
-        camera.write_text(re.sub("depth_scale: .*", "depth_scale: 1", camera.read_text(encoding="utf-8")), encoding="utf-8")
+        in_metres = re.sub("depth_scale: .*", "depth_scale: 1", camera.read_text(encoding="utf-8"))
+        camera.write_text(in_metres, encoding="utf-8")
         self.assert_fails(photoslam("run", sequence, "--output", self.output, *FAST), 1, "depth.max_m", "depth_scale")
 
     def test_unparsable_list(self):
@@ -431,8 +432,8 @@ class RunTest(CommandLineTest):
         output = self.run_deterministic("run", sequence=sequence)
         sequence.rename(self.folder / "moved")
         self.assert_fails(photoslam("eval", output), 1, sequence, output / "run.json")
-        description = (output / "run.json").read_text(encoding="utf-8")
-        (output / "run.json").write_text(description.replace(str(sequence), str(self.folder / "moved")), encoding="utf-8")
+        description = (output / "run.json").read_text(encoding="utf-8").replace(str(sequence), str(self.folder / "moved"))
+        (output / "run.json").write_text(description, encoding="utf-8")
         self.assertEqual(photoslam("eval", output).returncode, 0)
 
     def test_a_run_replaces_an_earlier_one_whole(self):
@@ -450,7 +451,8 @@ class RunTest(CommandLineTest):
         result = photoslam("run", sequence, "--output", self.output, "--deterministic")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertRegex(result.stderr, rf"note: frame 4 is lost: .*{image.name}")
-        self.assertRegex((self.output / "frames.csv").read_text(encoding="utf-8"), rf"\n4,[^,]*,lost,[^\n]*{image.name}")
+        log = (self.output / "frames.csv").read_text(encoding="utf-8")
+        self.assertRegex(log, rf"\n4,[^,]*,lost,[^\n]*{image.name}")
 
     def test_a_run_on_a_live_camera_is_not_read_again(self):
         output = self.run_deterministic("run")
@@ -589,7 +591,8 @@ class RunTest(CommandLineTest):
 
     def test_interrupted_training_saves_what_it_has(self):
         run = self.run_deterministic("run")
-        command = [BINARY, "train", "--poses", str(run), "--output", str(self.output), "--seconds", "600", "--threads", "2"]
+        command = [BINARY, "train", "--poses", str(run), "--output", str(self.output), "--seconds", "600", "--threads",
+                   "2"]
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         time.sleep(3.0)
         process.send_signal(signal.SIGINT)
@@ -657,7 +660,7 @@ class SessionTest(CommandLineTest):
     def test_two_sessions_are_merged(self):
         first = self.run_session()
         second = self.run_deterministic("second", "--set", "pipeline.iterations_per_frame=1", "--seed", "2")
-        both = self.folder / "both"
+        both, views = self.folder / "both", self.folder / "views"
         # So short a walk has no keyframes left that could confirm a loop.
         result = photoslam("merge", first, second / "session.photoslam", "--output", both, "--set",
                            "loop_closure.detection.min_confirmations=0")
@@ -667,6 +670,9 @@ class SessionTest(CommandLineTest):
         keyframes = [sum(not line.startswith("#") for line in poses) for poses in lines]
         self.assertEqual(keyframes[2], keyframes[0] + keyframes[1])
         self.assertTrue((both / "map.ply").is_file())
+        result = photoslam("render", both, "--orbit", "--orbit-frames", "2", "--output", views)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(len(list(views.glob("*.png"))), 2)
         found = self.run_deterministic("found", "--load-map", both, "--localize-only")
         frames = json.loads((found / "report.json").read_text(encoding="utf-8"))["frames"]
         self.assertEqual(frames["tracked"], frames["total"])
@@ -682,6 +688,9 @@ class SessionTest(CommandLineTest):
             result = photoslam("export", source, "--to", "ply", "--output", target)
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertEqual(sha256(target), sha256(first / "map.ply"))
+        # Beside what an earlier run has left it is what is shown.
+        (alone / "map.ply").write_bytes(b"older")
+        os.utime(alone / "map.ply", (0, 0))
         result = photoslam("render", alone, "--orbit", "--orbit-frames", "2", "--output", self.output)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(len(list(self.output.glob("*.png"))), 2)

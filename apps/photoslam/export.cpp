@@ -38,8 +38,8 @@ Result<std::vector<PosedCamera>> write_keyframe_images(const fs::path& run, cons
 
 Status export_cameras(const ExportArguments& arguments, const GaussianTable& map) {
   if (!fs::is_directory(arguments.input)) {
-    return error("{}: --to {} needs the output folder of a run: a map alone has no cameras", arguments.input.string(),
-                 arguments.to);
+    return error("{}: --to {} needs the output folder of a run, where the images of its keyframes can be found",
+                 arguments.input.string(), arguments.to);
   }
   const auto cameras = write_keyframe_images(arguments.input, arguments.output / "images");
   if (!cameras) return cameras.error();
@@ -55,9 +55,9 @@ Status export_cameras(const ExportArguments& arguments, const GaussianTable& map
 }
 
 Status export_map(const ExportArguments& arguments) {
-  const auto input = read_map_input(arguments.input);
+  const auto input = MapInput::open(arguments.input);
   if (!input) return input.error();
-  const GaussianTable& map = input->map;
+  const GaussianTable& map = input->map();
   if (arguments.to == "transforms" || arguments.to == "colmap") return export_cameras(arguments, map);
   if (Status status = prepare_output_folder(fs::absolute(arguments.output).parent_path()); !status) return status;
   const auto report = arguments.to == "spz"     ? write_gaussian_spz(arguments.output, map)

@@ -3,7 +3,6 @@
 #include "map_input.h"
 
 #include "pipeline/session_file.h"
-#include "pipeline/session_view.h"
 #include "run_folder.h"
 
 namespace photoslam {
@@ -11,41 +10,59 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Result<MapInput> input_from_session(const fs::path& path) {
-  auto view = view_session(path);
-  if (!view) return view.error();
-  return MapInput{std::move(view->map), view->camera, std::move(view->keyframes)};
-}
+fs::path session_in(const fs::path& folder) { return folder / "session.photoslam"; }
 
-Result<MapInput> read_map_file(const fs::path& path) {
-  auto map = read_gaussian_ply(path);
-  if (!map) return map.error();
-  return MapInput{std::move(*map), std::nullopt, {}};
+/// At its end a run writes the session, then map.ply.
+bool session_is_newer(const fs::path& folder) {
+  std::error_code ignored;
+  if (!fs::exists(session_in(folder), ignored)) return false;
+  if (!fs::exists(folder / "map.ply", ignored)) return true;
+  return fs::last_write_time(session_in(folder), ignored) > fs::last_write_time(folder / "map.ply", ignored);
 }
 
 }  // namespace
 
-Result<MapInput> read_map_input(const fs::path& path) {
-  if (!fs::is_directory(path)) return path.extension() == ".photoslam" ? input_from_session(path) : read_map_file(path);
-  const bool has_session = fs::exists(path / "session.photoslam");
-  if (!fs::exists(path / "map.ply") && has_session) return input_from_session(path);
-  auto input = read_map_file(path / "map.ply");
-  if (!input) return input;
-  if (fs::exists(path / "run.json")) {
-    const auto description = read_run_description(path);
-    if (!description) return description.error();
-    input->camera = description->camera;
-  } else if (has_session) {
-    const auto session = read_session(path);
-    if (!session) return session.error();
-    input->camera = session_header(*session).sensor.camera;
+Result<MapInput> MapInput::open(const fs::path& path) {
+  MapInput input(path);
+  const bool is_folder = fs::is_directory(path);
+  if (is_folder ? session_is_newer(path) : path.extension() == ".photoslam") {
+    auto view = view_session(path);
+    if (!view) return view.error();
+    input.session_ = std::move(*view);
+  } else {
+    auto map = read_gaussian_ply(is_folder ? path / "map.ply" : path);
+    if (!map) return map.error();
+    input.map_ = std::move(*map);
   }
-  if (fs::exists(path / "keyframes.tum")) {
-    auto keyframes = read_tum_trajectory(path / "keyframes.tum");
-    if (!keyframes) return keyframes.error();
-    input->keyframes = std::move(*keyframes);
-  }
+  if (input.map().size() == 0) return error("{} holds no gaussians", path.string());
   return input;
+}
+
+Result<PinholeCamera> MapInput::camera() const {
+  if (session_) return session_->camera;
+  if (fs::exists(path_ / "run.json")) {
+    const auto description = read_run_description(path_);
+    if (!description) return description.error();
+    return description->camera;
+  }
+  if (!fs::exists(session_in(path_))) {
+    return error("{}: neither the folder of a run nor a session: --trajectory and --orbit need --camera camera.yaml",
+                 path_.string());
+  }
+  const auto session = read_session(path_);
+  if (!session) return session.error();
+  return session_header(*session).sensor.camera;
+}
+
+Result<Trajectory> MapInput::keyframes() const {
+  if (session_) return session_->keyframes;
+  if (fs::exists(path_ / "run.json") && fs::exists(path_ / "keyframes.tum")) {
+    return read_tum_trajectory(path_ / "keyframes.tum");
+  }
+  if (!fs::exists(session_in(path_))) return Trajectory{};
+  auto view = view_session(path_);  // of a merge: by time the keyframes of two walks would be mixed
+  if (!view) return view.error();
+  return std::move(view->keyframes);
 }
 
 }  // namespace photoslam

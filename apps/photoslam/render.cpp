@@ -15,7 +15,7 @@
 #include "io/image_file.h"
 #include "io/npy_file.h"
 #include "map_input.h"
-#include "orbit.h"
+#include "photorealistic_mapping/orbit.h"
 #include "photorealistic_mapping/view_geometry.h"
 #include "photorealistic_mapping/world_export.h"
 #include "sources/calibration/calibration.h"
@@ -40,16 +40,12 @@ struct RenderArguments {
 
 /// The calibration to render with: --camera, else that of the run.
 Result<PinholeCamera> choose_camera(const RenderArguments& arguments, const MapInput& input) {
-  if (!arguments.camera.empty()) {
-    const auto file = read_calibration(arguments.camera);
-    if (!file) return file.error();
-    if (file->camera.width > 0) return file->camera;
-    return error("{} does not tell the size of the images; write a camera.yaml with width and height",
-                 arguments.camera.string());
-  }
-  if (input.camera) return *input.camera;
-  return error("{}: not the folder of a run or a session: --trajectory and --orbit need --camera camera.yaml",
-               arguments.map.string());
+  if (arguments.camera.empty()) return input.camera();
+  const auto file = read_calibration(arguments.camera);
+  if (!file) return file.error();
+  if (file->camera.width > 0) return file->camera;
+  return error("{} does not tell the size of the images; write a camera.yaml with width and height",
+               arguments.camera.string());
 }
 
 Result<std::vector<PosedCamera>> choose_views(const RenderArguments& arguments, const MapInput& input) {
@@ -58,8 +54,9 @@ Result<std::vector<PosedCamera>> choose_views(const RenderArguments& arguments, 
   if (!camera) return camera.error();
   std::vector<PosedCamera> views;
   if (arguments.orbit) {
-    for (const SE3& pose : orbit(input.map, input.keyframes, arguments.orbit_frames))
-      views.push_back({*camera, pose, {}});
+    const auto keyframes = input.keyframes();
+    if (!keyframes) return keyframes.error();
+    for (const SE3& pose : orbit(input.map(), *keyframes, arguments.orbit_frames)) views.push_back({*camera, pose, {}});
     return views;
   }
   const auto trajectory = read_tum_trajectory(arguments.trajectory);
@@ -77,7 +74,7 @@ Status write_view(const RenderArguments& arguments, size_t index, const splattin
 Status render(const RenderArguments& arguments) {
   const int chosen = !arguments.cameras.empty() + !arguments.trajectory.empty() + arguments.orbit;
   if (chosen != 1) throw CLI::ValidationError("give one of --cameras, --trajectory and --orbit");
-  const auto input = read_map_input(arguments.map);
+  const auto input = MapInput::open(arguments.map);
   if (!input) return input.error();
   const auto views = choose_views(arguments, *input);
   if (!views) return views.error();
@@ -85,7 +82,7 @@ Status render(const RenderArguments& arguments) {
   const auto gpu = arguments.backend.open();
   if (!gpu) return gpu.error();
 
-  const splatting::GaussianModel model = from_world(input->map);
+  const splatting::GaussianModel model = from_world(input->map());
   const std::vector<SE3> world = {SE3{}};
   ThreadPool executor(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
   splatting::Renderer renderer(*gpu);
@@ -101,7 +98,7 @@ Status render(const RenderArguments& arguments) {
     if (Status status = write_view(arguments, i, result); !status) return status;
   }
   report_failure(gpu->get());
-  fmt::print("{} images of {} gaussians in {}, {:.1f} ms each to render\n", views->size(), input->map.size(),
+  fmt::print("{} images of {} gaussians in {}, {:.1f} ms each to render\n", views->size(), input->map().size(),
              arguments.output.string(), render_ms / static_cast<double>(views->size()));
   return {};
 }

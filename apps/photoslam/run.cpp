@@ -191,6 +191,7 @@ Status run(const RunArguments& arguments) {
   auto gpu = arguments.backend.open();
   if (!gpu) return gpu.error();
   settings.gpu = *gpu;
+  if (interrupt.token().stop_requested()) return error("interrupted before anything was mapped");
 
   RunOutcome outcome;
   {

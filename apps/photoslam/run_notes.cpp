@@ -36,8 +36,9 @@ std::vector<std::string> notes_on(const RunOutcome& run, const RunSettings& sett
 
 std::string why_nothing_was_mapped(const RunOutcome& run, SensorKind sensor) {
   std::string why = run.frames.empty() ? "no frame was read" : run.frames.back().reason;
-  if (!run.failure.empty()) why += " (" + run.failure + ")";
-  if (sensor == SensorKind::rgbd) {
+  if (!run.failure.empty()) return why + " (" + run.failure + ")";
+  if (run.interrupted) return why + " until it was interrupted";
+  if (sensor == SensorKind::rgbd && !run.frames.empty()) {
     why += "; depth counts between depth.min_m and depth.max_m: is depth_scale in the calibration right?";
   }
   return why;

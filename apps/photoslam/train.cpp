@@ -229,6 +229,7 @@ Status train(const TrainArguments& arguments) {
   PhotorealisticMapper mapper(options->photorealistic_mapping, {.camera = input->camera}, arguments.seed, *gpu);
   int32_t keyframe = 0;
   for (size_t i = 0; i < input->images.size(); ++i) {
+    if (interrupt.token().stop_requested()) return error("interrupted before training began");
     if (is_held_out(arguments, i)) continue;
     mapper.add_keyframe(*map, KeyframeId(keyframe++), {input->images[i], {}, {}, input->mask(i)}, executor,
                         input->exposures[i]);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <span>
 
 #include "base/check.h"
 
@@ -15,15 +16,15 @@ namespace {
 
 /// Lets deflate or inflate work through the input; `last_flush` goes with the last of it.
 template <class Step>
-int feed(z_stream& stream, std::string_view in, std::string_view out, size_t most, int last_flush, Step&& step) {
+int feed(z_stream& stream, std::string_view in, std::span<char> out, size_t most, int last_flush, Step&& step) {
   const char* const in_end = in.data() + in.size();
-  const char* const out_end = out.data() + out.size();
+  char* const out_end = out.data() + out.size();
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(in.data()));
-  stream.next_out = reinterpret_cast<Bytef*>(const_cast<char*>(out.data()));
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
   int status = Z_OK;
   while (status == Z_OK) {
     const auto in_left = static_cast<size_t>(in_end - reinterpret_cast<const char*>(stream.next_in));
-    const auto out_left = static_cast<size_t>(out_end - reinterpret_cast<const char*>(stream.next_out));
+    const auto out_left = static_cast<size_t>(out_end - reinterpret_cast<char*>(stream.next_out));
     stream.avail_in = static_cast<uInt>(std::min(in_left, most));
     stream.avail_out = static_cast<uInt>(std::min(out_left, most));
     status = step(&stream, in_left <= most ? last_flush : Z_NO_FLUSH);
@@ -39,7 +40,7 @@ std::string packed(std::string_view bytes, size_t most_at_once) {
   const uint64_t size = bytes.size();
   std::string result(sizeof(size) + deflateBound(&stream, bytes.size()), '\0');
   std::memcpy(result.data(), &size, sizeof(size));
-  const std::string_view target = std::string_view(result).substr(sizeof(size));
+  const std::span<char> target = std::span(result).subspan(sizeof(size));
   const int status = feed(stream, bytes, target, most_at_once, Z_FINISH, deflate);
   result.resize(sizeof(size) + stream.total_out);
   deflateEnd(&stream);
@@ -49,11 +50,12 @@ std::string packed(std::string_view bytes, size_t most_at_once) {
 
 std::optional<std::string> unpacked(std::string_view bytes, size_t most_at_once) {
   uint64_t size = 0;
-  z_stream stream{};
-  if (bytes.size() < sizeof(size) || inflateInit(&stream) != Z_OK) return std::nullopt;
+  if (bytes.size() < sizeof(size)) return std::nullopt;
   std::memcpy(&size, bytes.data(), sizeof(size));
   constexpr uint64_t kMostPerByte = 1032;  // no deflate stream grows by more
   if (size / kMostPerByte > bytes.size()) return std::nullopt;
+  z_stream stream{};
+  PHOTOSLAM_CHECK(inflateInit(&stream) == Z_OK, "zlib could not start");
   std::string result(size, '\0');
   // To be told that this is the last of it, inflate would want all room for the rest at once.
   const int status = feed(stream, bytes.substr(sizeof(size)), result, most_at_once, Z_NO_FLUSH, inflate);

@@ -23,16 +23,16 @@ class PlaceEvidence {
   /// Image size [px]; the features found in the image.
   PlaceEvidence(int width, int height, const Features& features);
 
-  /// A landmark projects to this pixel.
+  /// A point of the map projects to this pixel.
   void expect(float x, float y) { ++expected_[cell(x, y)]; }
   /// One of those expected was found here.
   void find(float x, float y) { ++found_[cell(x, y)]; }
 
   int found() const;
-  /// Expected landmarks, but in no part of the image more than it has keypoints: noisy measurements make a landmark
+  /// Expected points, but in no part of the image more than it has keypoints: noisy measurements make a landmark
   /// anew in every keyframe, and keypoints are shared out among them.
   int findable() const;
-  /// Share of the image cells with expected landmarks in which some were found.
+  /// Share of the image cells with expected points in which some were found.
   double coverage() const;
 
   /// Whether more was found than of a place that only looks alike: of that it would be `min_matched_share` of what is

@@ -58,7 +58,7 @@ void TrackerOptions::visit(OptionVisitor& v) {
   v.value({"max_local_keyframes", "", 1, 1000, "Keyframes whose landmarks are searched in each frame."},
           max_local_keyframes);
   v.value({"min_found_share", "", 0.0, 1.0,
-           "A pose where less than this share of the landmarks that should be visible is found is none: the camera is "
+           "A pose where less than this share of the points that should be visible is found is none: the camera is "
            "looked for in the whole map."},
           min_found_share);
   v.value({"recently_lost_s", "s", 0.0, 1000.0,

@@ -40,7 +40,6 @@ Result<SessionView> view_session(const std::filesystem::path& path) {
     view.keyframes.push_back(
         {snapshot->keyframes[i]->keyframe.frame->timestamp_ns, frozen.keyframes_from_world[i].inverse()});
   }
-  std::ranges::sort(view.keyframes, {}, &StampedPose::timestamp_ns);
   return view;
 }
 

@@ -15,7 +15,7 @@ namespace photoslam {
 struct SessionView {
   PinholeCamera camera;  ///< Undistorted, and of a stereo pair the rectified left one.
   GaussianTable map;
-  Trajectory keyframes;
+  Trajectory keyframes;  ///< In the order in which they were made.
 };
 
 /// Reads session.photoslam, or the one of a folder, to look at: that of a run that was killed, too.

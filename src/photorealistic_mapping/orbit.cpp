@@ -1,11 +1,13 @@
 // Copyright the photoslam authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "orbit.h"
+#include "photorealistic_mapping/orbit.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <limits>
 #include <numbers>
 
+#include "base/check.h"
 #include "photorealistic_mapping/posed_map.h"
 
 namespace photoslam {
@@ -92,13 +94,18 @@ std::vector<SE3> swinging_along(const std::vector<SE3>& walk, double radius, int
 }  // namespace
 
 std::vector<SE3> orbit(const GaussianTable& map, const Trajectory& keyframes, int num_frames) {
+  PHOTOSLAM_CHECK(map.size() > 0, "no gaussians");
   if (keyframes.empty()) return views_from(around_gaussians(map), num_frames);
   std::vector<SE3> walk;
   for (const StampedPose& keyframe : keyframes) walk.push_back(keyframe.world_from_camera.inverse());
   const double aside = 0.02 * width(map);
   const Vec3 focus = focus_point(walk);
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const SE3& pose : walk) nearest = std::min(nearest, (pose * focus).norm());
   const auto is_in_view = [&](const SE3& pose) { return (pose * focus).normalized().z() > std::numbers::sqrt2 / 2; };
-  if (std::ranges::all_of(walk, is_in_view)) return views_from(around_walk(walk, focus, aside), num_frames);
+  if (std::ranges::all_of(walk, is_in_view)) {
+    return views_from(around_walk(walk, focus, std::min(aside, 0.1 * nearest)), num_frames);
+  }
   return swinging_along(walk, aside, num_frames);
 }
 
