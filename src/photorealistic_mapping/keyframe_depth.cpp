@@ -11,6 +11,9 @@ void KeyframeDepthOptions::visit(OptionVisitor& v) {
   v.value({"min_unexplained", "", 0.0, 1.0,
            "… and the map leaves at least this share of the picture transparent or shows it in another colour."},
           min_unexplained);
+  v.value({"spare_iterations", "", 0, 1000000,
+           "… or there is time: so many training iterations have been done since depth was measured last."},
+          spare_iterations);
   v.value({"neighbours", "", 0, 16, "Earlier keyframes to compare with, besides the right image of a stereo rig."},
           neighbours);
   v.value({"min_parallax", "", 0.0, 1.0, "Nearer keyframes measure too little: distance over median depth."},

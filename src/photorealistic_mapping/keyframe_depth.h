@@ -15,6 +15,7 @@ namespace photoslam {
 struct KeyframeDepthOptions {
   bool enabled = true;
   double min_unexplained = 0.05;
+  int spare_iterations = 50;
   int neighbours = 2;
   double min_parallax = 0.02;
   double max_parallax = 0.30;

@@ -76,8 +76,8 @@ void PhotorealisticMapper::serialize_view(Archive& a, const ImageU8& mask, Train
 void PhotorealisticMapper::serialize(Archive& a) {
   wholeness_.check(kName);
   uint64_t num_views = views_.size();
-  a(random_, schedule_, model_, anchors_from_world_, anchor_scales_, scene_depth_, iteration_, training_psnr_,
-    num_corrections_, num_views);
+  a(random_, schedule_, model_, anchors_from_world_, anchor_scales_, scene_depth_, iteration_, swept_at_,
+    training_psnr_, num_corrections_, num_views);
   ImageU8 mask = sensor_.mask;
   serialize_image(a, mask);
   if (a.reading()) views_.clear();

@@ -272,8 +272,12 @@ void PhotorealisticMapper::seed_keyframe(const MapSnapshot& map, size_t view, Ex
   show(view, executor);
   if (picture.depth.empty() && options_.depth.enabled) {
     const double unexplained = unexplained_share(options_.seeding, picture, render_, cell_size(options_.seeding));
-    const bool is_wanted = unexplained >= options_.depth.min_unexplained;
+    // What is trained long enough looks right in the next picture, too, wherever it is: colours explain, depth
+    // corrects.
+    const bool has_time = iteration_ - swept_at_ >= options_.depth.spare_iterations;
+    const bool is_wanted = has_time || unexplained >= options_.depth.min_unexplained;
     if (is_wanted) sweep_picture(map, view, executor);
+    if (is_wanted) swept_at_ = iteration_;
     views_[view].lacks_depth = is_wanted && picture.depth.empty();
   }
   settle_guesses_in(view, executor);

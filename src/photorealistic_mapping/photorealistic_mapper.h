@@ -200,6 +200,7 @@ class PhotorealisticMapper {
   int num_corrections_ = 0;                  // of the map, as taken over last
   double scene_depth_ = 1.0;                 // median over keyframes of their median depth [m]
   int iteration_ = 0;
+  int swept_at_ = 0;  // the iteration at which depth was measured last
   double training_psnr_ = 0;
 };
 

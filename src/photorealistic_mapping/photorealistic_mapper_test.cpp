@@ -71,10 +71,11 @@ TEST_F(PhotorealisticMapperTest, ASingleCameraSeedsBothKeyframesFromTheSecondOn)
   EXPECT_GT(share_on_the_wall(mapper, 0.08), 0.9);
 }
 
-TEST_F(PhotorealisticMapperTest, DepthIsMeasuredOnlyForWhatTheMapDoesNotExplain) {
-  const auto growth = [&](double min_unexplained) {
+TEST_F(PhotorealisticMapperTest, DepthIsMeasuredForWhatTheMapDoesNotExplainOrWhenThereIsTime) {
+  const auto growth = [&](double min_unexplained, int spare_iterations) {
     PhotorealisticOptions options;
     options.depth.min_unexplained = min_unexplained;
+    options.depth.spare_iterations = spare_iterations;
     options.reseed_interval = 0;
     options.densification.interval = 1000;
     PhotorealisticMapper mapper(options, {.camera = kCamera, .stereo_baseline_m = kBaseline}, 1);
@@ -86,8 +87,9 @@ TEST_F(PhotorealisticMapperTest, DepthIsMeasuredOnlyForWhatTheMapDoesNotExplain)
     add(mapper, at(0.6), stereo(at(0.6)));  // an eighth of the picture is new
     return static_cast<int>(mapper.gaussians().size()) - static_cast<int>(before);
   };
-  const int measured = growth(0.02), features_only = growth(0.9);
+  const int measured = growth(0.02, 61), features_only = growth(0.9, 61), with_time = growth(0.9, 60);
   EXPECT_GT(measured, features_only + 100);
+  EXPECT_EQ(with_time, measured);
 }
 
 TEST_F(PhotorealisticMapperTest, WhatWasGuessedGoesWhenItIsMeasuredFartherAway) {
