@@ -172,10 +172,7 @@ void set_images(const std::vector<FrameScore>& scores, const FinishedRun& run, R
     for (const FrameRecord& frame : run.log) {
       if (is_chosen(frame, which, run.description.hold_out)) chosen.insert(frame.frame);
     }
-    std::vector<FrameScore> some;
-    std::ranges::copy_if(scores, std::back_inserter(some),
-                         [&](const FrameScore& s) { return chosen.contains(s.frame); });
-    return summarize(some);
+    return summarize(scores, chosen);
   };
   report.image = summarize(scores);
   report.image_keyframes = among("keyframes");

@@ -99,8 +99,6 @@ void announce(const SourceInfo& info, const RunArguments& arguments) {
   fmt::print(stderr, "writing to {}\n", arguments.output.string());
 }
 
-bool has_session(const fs::path& folder) { return fs::exists(folder / "session.photoslam"); }
-
 /// Whether the map that is continued is the one in the output folder.
 bool continues_in_place(const RunArguments& arguments) {
   std::error_code ignored;
@@ -112,7 +110,7 @@ bool continues_in_place(const RunArguments& arguments) {
 /// What an earlier run has left in the folder goes as this one's results come, its session too.
 void announce_replacement(const RunArguments& arguments) {
   if (continues_in_place(arguments)) return;
-  if (has_session(arguments.output) || fs::exists(arguments.output / "map.ply"))
+  if (fs::exists(arguments.output / "session.photoslam") || fs::exists(arguments.output / "map.ply"))
     fmt::print(stderr, "  note: the results of an earlier run in {} will be replaced\n", arguments.output.string());
 }
 

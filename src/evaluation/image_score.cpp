@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 
 #include "image/convert.h"
 #include "image/metrics.h"
@@ -32,6 +33,13 @@ ImageFigures summarize(const std::vector<FrameScore>& scores) {
   figures.ssim = describe(ssims).mean;
   figures.frames = static_cast<int64_t>(scores.size());
   return figures;
+}
+
+ImageFigures summarize(const std::vector<FrameScore>& scores, const std::set<FrameId>& frames) {
+  std::vector<FrameScore> chosen;
+  std::ranges::copy_if(scores, std::back_inserter(chosen),
+                       [&](const FrameScore& s) { return frames.contains(s.frame); });
+  return summarize(chosen);
 }
 
 }  // namespace photoslam

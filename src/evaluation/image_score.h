@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "base/ids.h"
@@ -37,5 +38,7 @@ FrameScore score_frame(FrameId frame, int64_t timestamp_ns, const ImageF& render
 
 /// All unset when there are no scores.
 ImageFigures summarize(const std::vector<FrameScore>& scores);
+/// The same of those frames alone.
+ImageFigures summarize(const std::vector<FrameScore>& scores, const std::set<FrameId>& frames);
 
 }  // namespace photoslam

@@ -39,14 +39,6 @@ ScoringTask scoring_task(const RunOutcome& run, const FrozenMap& map) {
   return task;
 }
 
-/// The scores of the frames for which the predicate holds.
-template <class Predicate>
-ImageFigures summarize_if(const std::vector<FrameScore>& scores, Predicate&& predicate) {
-  std::vector<FrameScore> chosen;
-  std::ranges::copy_if(scores, std::back_inserter(chosen), [&](const FrameScore& s) { return predicate(s.frame); });
-  return summarize(chosen);
-}
-
 /// A few frames spread over the sequence, for people to look at.
 std::vector<FrameId> frames_to_show(const RunOutcome& run) {
   constexpr int kPairs = 8;
@@ -95,8 +87,8 @@ void add_image_figures(const RunOutcome& run, FrameSource& source, Executor& exe
   Report& report = html.report;
   report.image = summarize(scores[0].scores);
   report.image_online = refined ? summarize(scores[1].scores) : report.image;
-  report.image_keyframes = summarize_if(scores[0].scores, [&](FrameId id) { return keyframes.contains(id); });
-  report.image_held_out = summarize_if(scores[0].scores, [&](FrameId id) { return held_out.contains(id); });
+  report.image_keyframes = summarize(scores[0].scores, keyframes);
+  report.image_held_out = summarize(scores[0].scores, held_out);
   if (scores[0].render_ms > 0) report.render.fps = 1e3 / scores[0].render_ms;
   html.scores = std::move(scores[0].scores);
   html.pairs = std::move(scores[0].pairs);
