@@ -115,6 +115,7 @@ class UsageTest(CommandLineTest):
             "--refine-iterations": ("--deterministic", "--refine-seconds", "1"),
             "nothing to refine": ("--load-map", self.folder, "--localize-only", "--refine-seconds", "1"),
             "--camera excludes --fov": ("--camera", "a.yaml", "--fov", "60"),
+            "--pace realtime: --deterministic": ("--deterministic", "--pace", "realtime"),
         }.items():
             with self.subTest(words=words):
                 self.assert_fails(photoslam(*run, *options), 2, words)
@@ -507,6 +508,9 @@ class RunTest(CommandLineTest):
             _, begin = self.train(exported, "--iterations", "1")
             _, trained = self.train(exported, "--iterations", "150")
             self.assertGreater(trained, begin + 2, layout)
+        views = photoslam("render", self.folder / "trained", "--orbit", "--orbit-frames", "2", "--output", self.output)
+        self.assertEqual(views.returncode, 0, views.stderr)
+        self.assertEqual(len(list(self.output.glob("*.png"))), 2)
         # The same pictures of a lens that bends: they are resampled, and less of them counts.
         transforms = self.folder / "transforms" / "transforms.json"
         cameras = json.loads(transforms.read_text(encoding="utf-8"))

@@ -4,13 +4,14 @@
 
 #include "pipeline/session_file.h"
 #include "run_folder.h"
+#include "sources/camera_file.h"
 
 namespace photoslam {
 namespace {
 
 namespace fs = std::filesystem;
 
-fs::path session_in(const fs::path& folder) { return folder / "session.photoslam"; }
+fs::path session_in(const fs::path& folder) { return folder / kSessionFile; }
 
 /// At its end a run writes the session, then map.ply.
 bool session_is_newer(const fs::path& folder) {
@@ -45,6 +46,11 @@ Result<PinholeCamera> MapInput::camera() const {
     if (!description) return description.error();
     return description->camera;
   }
+  if (fs::exists(path_ / kCameraFile)) {  // of `train`
+    const auto file = read_camera_yaml(path_ / kCameraFile);
+    if (!file) return file.error();
+    return file->camera;
+  }
   if (!fs::exists(session_in(path_))) {
     return error("{}: neither the folder of a run nor a session: --trajectory and --orbit need --camera camera.yaml",
                  path_.string());
@@ -56,9 +62,8 @@ Result<PinholeCamera> MapInput::camera() const {
 
 Result<Trajectory> MapInput::keyframes() const {
   if (session_) return session_->keyframes;
-  if (fs::exists(path_ / "run.json") && fs::exists(path_ / "keyframes.tum")) {
-    return read_tum_trajectory(path_ / "keyframes.tum");
-  }
+  const bool is_whole_run = fs::exists(path_ / "run.json") || fs::exists(path_ / kCameraFile);
+  if (is_whole_run && fs::exists(path_ / "keyframes.tum")) return read_tum_trajectory(path_ / "keyframes.tum");
   if (!fs::exists(session_in(path_))) return Trajectory{};
   auto view = view_session(path_);  // of a merge: by time the keyframes of two walks would be mixed
   if (!view) return view.error();

@@ -29,7 +29,7 @@ struct MergeArguments {
 
 Status write_merged(const fs::path& folder, const MergedSessions& merged) {
   if (Status status = prepare_output_folder(folder); !status) return status;
-  if (Status status = write_session(folder / "session.photoslam", merged.session); !status) return status;
+  if (Status status = write_session(folder / kSessionFile, merged.session); !status) return status;
   // Files show one world, that of the first session's beginning; the session keeps what hangs together with nothing.
   Trajectory keyframes;
   std::vector<uint8_t> connected;

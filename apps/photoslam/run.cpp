@@ -60,14 +60,19 @@ Status configure(const RunArguments& arguments, SystemOptions& options, RunSetti
   settings.preview = !arguments.preview.empty();
   if (arguments.map_until_s >= 0) settings.map_until_s = arguments.map_until_s;
   if (settings.deterministic || settings.logical_time || arguments.pace == "asap") settings.pace = Pace::asap;
-  if (!arguments.no_session) settings.session_file = arguments.output / "session.photoslam";
+  if (!arguments.no_session) settings.session_file = arguments.output / kSessionFile;
   return {};
 }
 
 /// Combinations of options that contradict each other.
-void check_combinations(const RunArguments& arguments) {
+void check_combinations(const RunArguments& arguments, bool wants_realtime) {
   const RunSettings& settings = arguments.settings;
   check_hold_out(settings.hold_out);
+  if (wants_realtime && (settings.deterministic || arguments.iterations_per_frame >= 0)) {
+    throw CLI::ValidationError("--pace realtime",
+                               fmt::format("{} counts training by frames, whatever the clock says",
+                                           settings.deterministic ? "--deterministic" : "--iterations-per-frame"));
+  }
   if (settings.deterministic && settings.refine_seconds > 0) {
     throw CLI::ValidationError("--refine-seconds",
                                "depends on the clock; with --deterministic use --refine-iterations");
@@ -110,14 +115,14 @@ bool continues_in_place(const RunArguments& arguments) {
 /// What an earlier run has left in the folder goes as this one's results come, its session too.
 void announce_replacement(const RunArguments& arguments) {
   if (continues_in_place(arguments)) return;
-  if (fs::exists(arguments.output / "session.photoslam") || fs::exists(arguments.output / "map.ply"))
+  if (fs::exists(arguments.output / kSessionFile) || fs::exists(arguments.output / "map.ply"))
     fmt::print(stderr, "  note: the results of an earlier run in {} will be replaced\n", arguments.output.string());
 }
 
 void remove_replaced_session(const RunArguments& arguments, const RunSettings& settings) {
   std::error_code ignored;
   const bool writes_one = !settings.session_file.empty() && !settings.localize_only;
-  if (!writes_one && !continues_in_place(arguments)) fs::remove(arguments.output / "session.photoslam", ignored);
+  if (!writes_one && !continues_in_place(arguments)) fs::remove(arguments.output / kSessionFile, ignored);
 }
 
 /// What is left of a camera after the run: nothing to compare the map with.
@@ -253,9 +258,10 @@ void add_run(CommandLine& line) {
   command.add_option("--output", a.output, "Folder for the results")->capture_default_str();
   command.add_option("--preview", a.preview,
                      "Picture rewritten every second: the newest keyframe beside its render, and the trajectory");
-  command.add_option("--pace", a.pace, "Release frames at their timestamps, or as fast as they are tracked")
-      ->check(CLI::IsMember({"realtime", "asap"}))
-      ->capture_default_str();
+  const CLI::Option* const pace =
+      command.add_option("--pace", a.pace, "Release frames at their timestamps, or as fast as they are tracked")
+          ->check(CLI::IsMember({"realtime", "asap"}))
+          ->capture_default_str();
   command.add_option("--refine-seconds", a.settings.refine_seconds, "Keep training so long after the last frame")
       ->check(CLI::Range(0.0, 1e6));
   command.add_option("--refine-iterations", a.settings.refine_iterations, "The same, counted in iterations")
@@ -284,10 +290,10 @@ void add_run(CommandLine& line) {
   a.backend.bind(command);
   a.config.bind(command);
   command.add_flag("--json", a.json, "Print the report as JSON instead of the table");
-  line.on_run(command, [arguments]() -> Status {
+  line.on_run(command, [arguments, pace]() -> Status {
     const auto sensor = parse_sensor(arguments->sensor);
     if (!sensor) return sensor.error();
-    check_combinations(*arguments);
+    check_combinations(*arguments, pace->count() > 0 && arguments->pace == "realtime");
     arguments->source.sensor = *sensor;
     return run(*arguments);
   });

@@ -25,6 +25,7 @@
 #include "photorealistic_mapping/world_export.h"
 #include "posed_images.h"
 #include "run_folder.h"
+#include "sources/camera_file.h"
 
 namespace photoslam {
 namespace {
@@ -179,11 +180,27 @@ Status score(const TrainArguments& arguments, const PosedImages& input, const Fr
   return {};
 }
 
-/// map.ply, and for the keyframes of a run exposures.txt; returns the number of gaussians.
+/// Where the pictures that were trained on had been taken; those without a time are a second apart.
+Trajectory trained_poses(const TrainArguments& arguments, const PosedImages& input, const FrozenMap& map) {
+  Trajectory result;
+  for (size_t i = 0; i < input.poses.size(); ++i) {
+    if (is_held_out(arguments, i)) continue;
+    const int64_t time_ns = input.times_ns.empty() ? static_cast<int64_t>(i) * 1'000'000'000 : input.times_ns[i];
+    result.push_back({time_ns, map.keyframes_from_world[result.size()].inverse()});
+  }
+  return result;
+}
+
+/// map.ply, what `render` wants to know beside it and, for the keyframes of a run, exposures.txt; returns the number of
+/// gaussians.
 Result<size_t> write_map(const TrainArguments& arguments, const PosedImages& input, const FrozenMap& map) {
   const auto written =
       write_gaussian_ply(arguments.output / "map.ply", to_world(map.gaussians, map.anchors_from_world));
   if (!written) return written.error();
+  const std::string camera = camera_yaml({.camera = input.camera, .distortion = {}});
+  if (Status status = write_file_atomically(arguments.output / kCameraFile, camera); !status) return status.error();
+  const Trajectory poses = trained_poses(arguments, input, map);
+  if (Status status = write_tum_trajectory(arguments.output / "keyframes.tum", poses); !status) return status.error();
   if (input.times_ns.empty()) return written->written;
   ExposureTrack track;
   for (size_t i = 0; i < input.times_ns.size(); ++i) {
@@ -262,7 +279,9 @@ void add_train(CommandLine& line) {
   TrainArguments& a = *arguments;
   command.add_option("images", a.input, "transforms.json, or a folder with one or with a COLMAP model");
   command.add_option("--poses", a.run, "Take images and poses of the keyframes of a run instead");
-  command.add_option("--output", a.output, "Folder for map.ply and pairs/ (photo left, render right)")
+  command
+      .add_option("--output", a.output,
+                  "Folder for map.ply, camera.yaml, keyframes.tum and pairs/ (photo left, render right)")
       ->capture_default_str();
   command
       .add_option(

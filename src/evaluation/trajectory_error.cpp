@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluation/trajectory_error.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -48,6 +49,32 @@ size_t nearest(const std::vector<int64_t>& increasing, int64_t wanted) {
   return take_before ? index - 1 : index;
 }
 
+/// Share of a path's length (root mean squares about the mean) up to which its width leaves the turn about it open.
+constexpr double kStraight = 0.01;
+
+/// The alignment turned about the true path, if that is straight, so that the orientations agree best (least squares of
+/// the rotation matrices, in closed form): what positions say about this turn is their noise over the path's width.
+Sim3 settle_turn(const Sim3& truth_from_estimate, const Trajectory& estimate, const Trajectory& truth,
+                 const Pairs& pairs) {
+  const auto count = static_cast<double>(pairs.size());
+  Vec3 mean = Vec3::Zero();
+  for (const auto& [i, j] : pairs) mean += truth[j].world_from_camera.translation / count;
+  Mat3 spread = Mat3::Zero(), estimate_over_truth = Mat3::Zero();
+  for (const auto& [i, j] : pairs) {
+    const Vec3 offset = truth[j].world_from_camera.translation - mean;
+    spread += offset * offset.transpose();
+    const Quat turned = truth_from_estimate.rotation * estimate[i].world_from_camera.rotation;
+    estimate_over_truth += (turned * truth[j].world_from_camera.rotation.conjugate()).toRotationMatrix();
+  }
+  const Eigen::SelfAdjointEigenSolver<Mat3> axes(spread);  // variances ascend
+  if (axes.eigenvalues()[1] > kStraight * kStraight * axes.eigenvalues()[2]) return truth_from_estimate;
+  const Vec3 path = axes.eigenvectors().col(2);
+  const double sine = (hat(path) * estimate_over_truth).trace();
+  const double cosine = estimate_over_truth.trace() - path.dot(estimate_over_truth * path);
+  const Quat turn = so3_exp(std::atan2(sine, cosine) * path);
+  return Sim3(1, turn, mean - turn * mean) * truth_from_estimate;
+}
+
 }  // namespace
 
 Pairs associate(const Trajectory& estimate, const Trajectory& truth, int64_t max_difference_ns) {
@@ -64,13 +91,14 @@ std::optional<AbsoluteError> absolute_error(const Trajectory& estimate, const Tr
     target.push_back(truth[j].world_from_camera.translation);
   }
   AbsoluteError result;
-  result.truth_from_estimate = align_umeyama(source, target, with_scale);
-  result.scale = result.truth_from_estimate.scale;
+  const Sim3 by_positions = align_umeyama(source, target, with_scale);
+  result.truth_from_estimate = settle_turn(by_positions, estimate, truth, pairs);
+  result.scale = by_positions.scale;
   result.matched = pairs.size();
 
   std::vector<double> distances, angles;
   for (size_t k = 0; k < pairs.size(); ++k) {
-    distances.push_back((result.truth_from_estimate * source[k] - target[k]).norm());
+    distances.push_back((by_positions * source[k] - target[k]).norm());
     const Quat aligned_rotation =
         result.truth_from_estimate.rotation * estimate[pairs[k].first].world_from_camera.rotation;
     angles.push_back(degrees(truth[pairs[k].second].world_from_camera.rotation.conjugate() * aligned_rotation));

@@ -17,7 +17,8 @@ namespace photoslam {
 std::vector<std::pair<size_t, size_t>> associate(const Trajectory& estimate, const Trajectory& truth,
                                                  int64_t max_difference_ns = 20'000'000);
 
-/// Absolute trajectory error after the best alignment of estimate to truth (Umeyama 1991; Sturm et al. 2012).
+/// Absolute trajectory error after the best alignment of estimate to truth by their positions (Umeyama 1991; Sturm et
+/// al. 2012). Where the path is straight to a hundredth, orientations settle the turn about it for what concerns them.
 struct AbsoluteError {
   double rmse_m = 0;
   double std_m = 0;

@@ -101,6 +101,29 @@ TEST(AbsoluteError, SeesTurnedCameras) {
   EXPECT_NEAR(error.rot_rmse_deg, 2, 1e-6);
 }
 
+TEST(AbsoluteError, OfAStraightPathDoesNotTurnAboutIt) {
+  // 50 m ahead, every position off by some 2 cm: by them alone the cameras would be turned about the path by degrees.
+  Random random(5);
+  Trajectory truth, estimate;
+  const SE3 other_from_world(so3_exp(Vec3(0.3, -1.2, 2.0)), Vec3(5, -3, 8));
+  for (int i = 0; i < 100; ++i) {
+    const SE3 pose(so3_exp(0.05 * Vec3(random.normal(), random.normal(), random.normal())), Vec3(0, 0, 0.5 * i));
+    const Vec3 noise = 0.02 * Vec3(random.normal(), random.normal(), random.normal());
+    truth.push_back({i * kFrameInterval, pose});
+    estimate.push_back({i * kFrameInterval, other_from_world * SE3(pose.rotation, pose.translation + noise)});
+  }
+  const AbsoluteError error = absolute_error(estimate, truth, false).value();
+  EXPECT_LT(error.rot_rmse_deg, 0.1);
+  const Trajectory back = aligned(estimate, error.truth_from_estimate);
+  EXPECT_LT((back[50].world_from_camera.translation - truth[50].world_from_camera.translation).norm(), 0.1);
+  // A turn about the path that the cameras really made is still seen.
+  for (size_t i = 0; i < estimate.size(); ++i) {
+    Quat& rotation = estimate[i].world_from_camera.rotation;
+    rotation = rotation * so3_exp(Vec3(0, 0, i % 2 == 0 ? 2 * kDegree : -2 * kDegree));
+  }
+  EXPECT_NEAR(absolute_error(estimate, truth, false)->rot_rmse_deg, 2, 0.1);
+}
+
 TEST(AbsoluteError, ComparesOnlyPosesWithinTwentyMilliseconds) {
   const Trajectory truth = random_walk(30, 4);
   Trajectory estimate = truth;

@@ -16,7 +16,7 @@
 namespace photoslam {
 namespace {
 
-constexpr FileKind kSessionFile{.name = "session", .magic = "PHSLSESS", .version = 11, .oldest = 11};
+constexpr FileKind kFormat{.name = "session", .magic = "PHSLSESS", .version = 11, .oldest = 11};
 
 /// Where a value that applies from now on does not reach what the map holds already.
 std::string_view what_stays(std::string_view key) {
@@ -35,7 +35,7 @@ void SessionHeader::serialize(Archive& a) {
 }
 
 Status write_session(const std::filesystem::path& path, const Archive& session) {
-  return write_checked_file(path, kSessionFile, packed(session.bytes()));
+  return write_checked_file(path, kFormat, packed(session.bytes()));
 }
 
 std::string describe_unsaved_session(const std::filesystem::path& path, const std::string& why) {
@@ -49,8 +49,8 @@ std::string describe_unsaved_session(const std::filesystem::path& path, const st
 Result<std::string> read_session(const std::filesystem::path& path) {
   std::error_code ignored;
   const bool is_folder = std::filesystem::is_directory(path, ignored);
-  const std::filesystem::path file = is_folder ? path / "session.photoslam" : path;
-  const Result<std::string> content = read_checked_file(file, kSessionFile);
+  const std::filesystem::path file = is_folder ? path / kSessionFile : path;
+  const Result<std::string> content = read_checked_file(file, kFormat);
   if (!content) return content.error();
   std::optional<std::string> session = unpacked(*content);
   if (!session) return error("{} is damaged: its content cannot be unpacked; use another copy", file.string());

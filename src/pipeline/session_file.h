@@ -13,6 +13,9 @@
 
 namespace photoslam {
 
+/// Name of the session in the output folder of a run.
+inline constexpr const char* kSessionFile = "session.photoslam";
+
 /// What a session says of itself before the map begins.
 struct SessionHeader {
   MapperSensor sensor;        ///< Its camera is undistorted or rectified, as everything in the map sees the world.

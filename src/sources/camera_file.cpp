@@ -54,4 +54,18 @@ Result<CameraFile> read_camera_yaml(const std::filesystem::path& path) {
   return file;
 }
 
+std::string camera_yaml(const CameraFile& file) {
+  const PinholeCamera& c = file.camera;
+  const bool fisheye = file.distortion.model == LensModel::kannala_brandt;
+  std::string text = fmt::format(
+      "# colour camera{}\nmodel: {}\nwidth: {}\nheight: {}\nfx: {}\nfy: {}\ncx: {}\ncy: {}\ndistortion: [{}]\n",
+      file.depth_scale ? "; depth is registered to it" : "", fisheye ? "fisheye" : "pinhole", c.width, c.height, c.fx,
+      c.fy, c.cx, c.cy, coefficients_text(file.distortion));
+  if (file.frames_per_second) text += fmt::format("fps: {}\n", *file.frames_per_second);
+  if (file.depth_scale) {
+    text += fmt::format("depth_scale: {:.1f}  # stored value / depth_scale = metres\n", *file.depth_scale);
+  }
+  return text;
+}
+
 }  // namespace photoslam

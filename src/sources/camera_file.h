@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "base/result.h"
 #include "camera/distortion.h"
@@ -16,9 +17,10 @@ namespace photoslam {
 struct CameraFile {
   PinholeCamera camera;
   Distortion distortion;
-  std::optional<double> frames_per_second;
-  std::optional<double> depth_scale;      ///< Stored depth value / depth_scale = metres.
-  std::optional<RightCamera> right = {};  ///< Of stereo rigs, where the file tells.
+  std::optional<double> frames_per_second = {};
+  std::optional<double> depth_scale = {};  ///< Stored depth value / depth_scale = metres.
+  std::optional<RightCamera> right = {};   ///< Of stereo rigs, where the file tells.
+  bool is_guess = false;                   ///< Of a field of view: there is no file.
 };
 
 /// Reads `camera.yaml`: width, height, fx, fy, cx, cy [px], and optionally model (pinhole or fisheye), distortion (a
@@ -27,5 +29,8 @@ struct CameraFile {
 ///
 /// Missing, unknown (with the nearest known one) and senseless values are errors with file and line.
 Result<CameraFile> read_camera_yaml(const std::filesystem::path& path);
+
+/// The text of a camera.yaml of one camera.
+std::string camera_yaml(const CameraFile& file);
 
 }  // namespace photoslam

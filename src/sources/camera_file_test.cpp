@@ -42,6 +42,19 @@ TEST_F(CameraFileTest, ReadsEveryKey) {
   EXPECT_EQ(file.depth_scale, 1000);
 }
 
+TEST_F(CameraFileTest, WhatIsWrittenIsRead) {
+  CameraFile fisheye;
+  fisheye.camera = {320, 240, 190.125, 190.25, 160.5, 120.75};
+  fisheye.distortion = {.k1 = 0.01, .k2 = -0.02, .k3 = 0.003, .k4 = 1e-5, .model = LensModel::kannala_brandt};
+  for (const CameraFile& file : {read_camera_yaml(write("camera.yaml", kComplete)).value(), fisheye}) {
+    const CameraFile read = read_camera_yaml(write("written.yaml", camera_yaml(file))).value();
+    EXPECT_EQ(read.camera, file.camera);
+    EXPECT_EQ(read.distortion, file.distortion);
+    EXPECT_EQ(read.frames_per_second, file.frames_per_second);
+    EXPECT_EQ(read.depth_scale, file.depth_scale);
+  }
+}
+
 TEST_F(CameraFileTest, WhatIsOptionalMayBeAbsent) {
   EXPECT_TRUE(read_with("[0.1, -0.2, 0.001, 0.002, 0.3]", "[]")->distortion.none());
   EXPECT_TRUE(read_with("distortion: [0.1, -0.2, 0.001, 0.002, 0.3]", "")->distortion.none());

@@ -45,6 +45,7 @@ struct SourceInfo {
   SensorKind sensor = SensorKind::rgbd;
   PinholeCamera camera;  ///< Raw intrinsics; with a distortion, those of the distorted image.
   Distortion distortion;
+  bool camera_is_guess = false;      ///< Of a field of view, for want of a calibration.
   std::optional<RightCamera> right;  ///< Present exactly with stereo sensors.
   double metres_per_depth_unit = 0.0;
   double frames_per_second = 0.0;  ///< Nominal.

@@ -55,6 +55,35 @@ Status check_folder(const fs::path& path) {
   return {};
 }
 
+Result<std::unique_ptr<FrameSource>> open_any(const fs::path& path, const SourceOptions& options) {
+  if (const auto device = internal::camera_device(path.string())) {
+    if (options.format == "auto") return internal::open_webcam(*device, options);
+    return error("{} is a live camera and has no format: leave out --format {}", path.string(), options.format);
+  }
+  std::error_code ignored;
+  const bool as_video = options.format == kVideo;
+  if (fs::is_regular_file(path, ignored) && (as_video || options.format == "auto")) {
+    if (path.extension() == ".json") {
+      return error("{} is not a video; images whose poses are known are mapped with: photoslam train {}", path.string(),
+                   path.string());
+    }
+    return internal::open_video(path, options);
+  }
+  if (fs::is_directory(path, ignored) && as_video) return error("{} is a folder; a video is a file", path.string());
+  if (const Status status = check_folder(path); !status) return status.error();
+  for (const Format& format : formats()) {
+    if (options.format == format.name) return format.open(path, options);
+  }
+  if (options.format != "auto") return unknown_format(options.format);
+  for (const Format& format : formats()) {
+    if (format.matches(path)) return format.open(path, options);
+  }
+  return error(
+      "cannot tell the format of {}: found neither associations.txt nor rgb.txt (TUM RGB-D), nor mav0/cam0/data.csv "
+      "(EuRoC), nor calib.txt with image_0 or image_2 (KITTI), nor results/frame*.jpg (Replica), nor images",
+      path.string());
+}
+
 }  // namespace
 
 std::vector<std::string> source_formats() {
@@ -82,32 +111,12 @@ std::vector<std::string> describe_cameras() {
 bool is_camera(const fs::path& path) { return internal::camera_device(path.string()).has_value(); }
 
 Result<std::unique_ptr<FrameSource>> open_source(const fs::path& path, const SourceOptions& options) {
-  if (const auto device = internal::camera_device(path.string())) {
-    if (options.format == "auto") return internal::open_webcam(*device, options);
-    return error("{} is a live camera and has no format: leave out --format {}", path.string(), options.format);
+  auto source = open_any(path, options);
+  if (source && options.fov_deg > 0 && !(*source)->info().camera_is_guess) {
+    return error("{} has a calibration, and --fov {:g} guesses one: leave out --fov, or name another with --camera",
+                 path.string(), options.fov_deg);
   }
-  std::error_code ignored;
-  const bool as_video = options.format == kVideo;
-  if (fs::is_regular_file(path, ignored) && (as_video || options.format == "auto")) {
-    if (path.extension() == ".json") {
-      return error("{} is not a video; images whose poses are known are mapped with: photoslam train {}", path.string(),
-                   path.string());
-    }
-    return internal::open_video(path, options);
-  }
-  if (fs::is_directory(path, ignored) && as_video) return error("{} is a folder; a video is a file", path.string());
-  if (const Status status = check_folder(path); !status) return status.error();
-  for (const Format& format : formats()) {
-    if (options.format == format.name) return format.open(path, options);
-  }
-  if (options.format != "auto") return unknown_format(options.format);
-  for (const Format& format : formats()) {
-    if (format.matches(path)) return format.open(path, options);
-  }
-  return error(
-      "cannot tell the format of {}: found neither associations.txt nor rgb.txt (TUM RGB-D), nor mav0/cam0/data.csv "
-      "(EuRoC), nor calib.txt with image_0 or image_2 (KITTI), nor results/frame*.jpg (Replica), nor images",
-      path.string());
+  return source;
 }
 
 }  // namespace photoslam

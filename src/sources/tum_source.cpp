@@ -129,6 +129,7 @@ Result<std::unique_ptr<FrameSource>> open_tum(const fs::path& folder, const Sour
 
   info.camera = camera->camera;
   info.distortion = camera->distortion;
+  info.camera_is_guess = camera->is_guess;
   info.frames_per_second = camera->frames_per_second.value_or(0);
   if (info.sensor == SensorKind::rgbd) {
     set_depth_unit(camera->depth_scale, kDefaultDepthScale, info);

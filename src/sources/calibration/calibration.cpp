@@ -59,6 +59,7 @@ CameraFile guess_camera(double fov_deg, int width, int height) {
   const double focal = 0.5 * width / std::tan(0.5 * fov_deg * std::numbers::pi / 180);
   CameraFile file;
   file.camera = {width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1)};
+  file.is_guess = true;
   return file;
 }
 
@@ -93,6 +94,7 @@ Status apply_camera(const CameraFile& file, const std::string& where, SourceInfo
   }
   info.camera = file.camera;
   info.distortion = file.distortion;
+  info.camera_is_guess = file.is_guess;
   info.frames_per_second = file.frames_per_second.value_or(0);
   if (info.sensor == SensorKind::stereo) info.right = file.right;
   return {};

@@ -180,6 +180,7 @@ TEST_F(ImageFolderTest, ReadsImagesInNaturalOrder) {
   }
   EXPECT_FALSE(source->next().has_value());
   write("camera.yaml", "width: 16\nheight: 12\nfx: 10\nfy: 11\ncx: 7.5\ncy: 5.5\n");
+  EXPECT_THAT(open_source(folder, {.fov_deg = 90}).error().message, HasSubstr("has a calibration, and --fov 90"));
   EXPECT_EQ(open_source(folder).value()->info().camera.fx, 10);
   EXPECT_THAT(open_source(folder).value()->info().notes, ElementsAre(HasSubstr("no frame rate given: taking 30 Hz")));
 }

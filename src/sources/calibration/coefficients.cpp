@@ -26,6 +26,12 @@ Result<Distortion> distortion_from(LensModel model, std::span<const double> coef
   return Distortion{c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], model};
 }
 
+std::string coefficients_text(const Distortion& d) {
+  if (d.none()) return "";
+  if (d.model == LensModel::kannala_brandt) return fmt::format("{}, {}, {}, {}", d.k1, d.k2, d.k3, d.k4);
+  return fmt::format("{}, {}, {}, {}, {}, {}, {}, {}", d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6);
+}
+
 Result<SE3> rigid_from_rows(std::span<const double> numbers) {
   if (numbers.size() != 12 && numbers.size() != 16) {
     return error("expected the 16 numbers of a pose matrix, or its first 12, found {}", numbers.size());

@@ -7,6 +7,7 @@
 #include "base/file.h"
 #include "io/image_file.h"
 #include "sources/calibration/coefficients.h"
+#include "sources/camera_file.h"
 
 namespace photoslam::synthetic {
 namespace {
@@ -39,13 +40,6 @@ Status write_all(const fs::path& folder, const std::vector<TextFile>& files) {
   return {};
 }
 
-/// "a, b, c, d": four coefficients, or as many as are needed.
-std::string coefficients_text(const Distortion& d) {
-  if (d.none()) return "";
-  if (d.model == LensModel::kannala_brandt) return fmt::format("{}, {}, {}, {}", d.k1, d.k2, d.k3, d.k4);
-  return fmt::format("{}, {}, {}, {}, {}, {}, {}, {}", d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6);
-}
-
 class TumLayout final : public LayoutWriter {
  public:
   TumLayout(const SyntheticCamera& camera, bool lossless, fs::path folder)
@@ -74,7 +68,10 @@ class TumLayout final : public LayoutWriter {
       truth += fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", time(i), t.x(), t.y(), t.z(), q.x(),
                            q.y(), q.z(), q.w());
     }
-    const std::string calibration = camera_yaml();
+    CameraFile camera = {.camera = camera_.options().camera, .distortion = camera_.options().distortion};
+    camera.frames_per_second = camera_.options().frames_per_second;
+    if (depth()) camera.depth_scale = 1 / metres_per_depth_unit();
+    const std::string calibration = camera_yaml(camera);
     std::vector<TextFile> files = {{"rgb.txt", colors}, {"groundtruth.txt", truth}, {"camera.yaml", calibration}};
     if (depth()) {
       files.push_back({"depth.txt", depths});
@@ -88,20 +85,6 @@ class TumLayout final : public LayoutWriter {
   std::string time(int index) const { return format_seconds(camera_.timestamp_ns(index)); }
   std::string color_name(int index) const { return fmt::format("rgb/{}.{}", time(index), lossless_ ? "png" : "jpg"); }
   std::string depth_name(int index) const { return fmt::format("depth/{}.png", time(index)); }
-
-  std::string camera_yaml() const {
-    const PinholeCamera& c = camera_.options().camera;
-    const Distortion& d = camera_.options().distortion;
-    std::string text = fmt::format(
-        "# colour camera{}\nmodel: {}\nwidth: {}\nheight: {}\nfx: {}\nfy: {}\ncx: {}\n"
-        "cy: {}\ndistortion: [{}]\nfps: {}\n",
-        depth() ? "; depth is registered to it" : "", d.model == LensModel::kannala_brandt ? "fisheye" : "pinhole",
-        c.width, c.height, c.fx, c.fy, c.cx, c.cy, coefficients_text(d), camera_.options().frames_per_second);
-    if (depth()) {
-      text += fmt::format("depth_scale: {:.1f}  # stored value / depth_scale = metres\n", 1 / metres_per_depth_unit());
-    }
-    return text;
-  }
 
   const SyntheticCamera& camera_;
   bool lossless_;
