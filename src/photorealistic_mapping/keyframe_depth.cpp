@@ -19,6 +19,9 @@ void KeyframeDepthOptions::visit(OptionVisitor& v) {
   v.value({"min_parallax", "", 0.0, 1.0, "Nearer keyframes measure too little: distance over median depth."},
           min_parallax);
   v.value({"max_parallax", "", 0.0, 10.0, "Farther keyframes look too different."}, max_parallax);
+  v.value({"agreement", "", 0.0, 1.0,
+           "A depth is confirmed where another keyframe's differs by at most this share; 0: none is."},
+          agreement);
   v.group("sweep", "The plane sweep.", sweep);
 }
 
@@ -50,6 +53,16 @@ std::vector<KeyframeId> sweep_neighbours(const KeyframeDepthOptions& options, co
         map.keyframe(candidate.keyframe).keyframe.camera_from_world * view.keyframe.camera_from_world.inverse();
     const double parallax = other_from_this.translation.norm() / std::max(view.median_depth, 1e-9);
     if (parallax >= options.min_parallax && parallax <= options.max_parallax) chosen.push_back(candidate.keyframe);
+  }
+  return chosen;
+}
+
+std::vector<KeyframeId> confirming_keyframes(const MapSnapshot& map, KeyframeId id,
+                                             const std::function<bool(KeyframeId)>& has_depth) {
+  constexpr size_t kMost = 4;
+  std::vector<KeyframeId> chosen;
+  for (const CovisibleKeyframe& candidate : map.keyframe(id).covisible) {
+    if (chosen.size() < kMost && has_depth(candidate.keyframe)) chosen.push_back(candidate.keyframe);
   }
   return chosen;
 }

@@ -15,7 +15,7 @@ class Archive;
 
 struct ScheduleOptions {
   int pyramid_levels = 3;
-  int start_pixels = 32000;
+  int start_pixels = 130000;
   int uses_per_level = 4;
   int online_pixels = 130000;
   int online_uses = 32;

@@ -89,6 +89,7 @@ TEST(KeyframeSchedule, TheNewestTakesTurnsWithSeamsUntilItIsTaught) {
   options.newest_probability = 1;
   options.uses_per_level = 3;
   options.seam_uses = 20;
+  options.start_pixels = 160 * 120;
   KeyframeSchedule schedule(options, 640, 480, 5);
   ASSERT_EQ(schedule.coarsest_level() - schedule.online_level(), 1);
   for (int i = 0; i < 4; ++i) schedule.add_view();

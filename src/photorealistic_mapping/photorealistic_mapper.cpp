@@ -10,6 +10,7 @@
 #include "base/check.h"
 #include "image/convert.h"
 #include "math/median.h"
+#include "photorealistic_mapping/confirmed_depth.h"
 #include "photorealistic_mapping/guesses.h"
 #include "photorealistic_mapping/handover.h"
 #include "photorealistic_mapping/seams.h"
@@ -283,7 +284,26 @@ void PhotorealisticMapper::seed_keyframe(const MapSnapshot& map, size_t view, Ex
   settle_guesses_in(view, executor);
   const Keyframe& keyframe = map.keyframe(KeyframeId(static_cast<int32_t>(view))).keyframe;
   newest_features_ = feature_depths(options_.feature_depth, map, keyframe, picture, kSeedingFactor);
-  seed(view, {cell_size(options_.seeding), options_.seeding.min_color_error}, newest_features_);
+  SeedingRound round{cell_size(options_.seeding), options_.seeding.min_color_error};
+  round.confirmed = confirm_depth(map, view);
+  seed(view, round, newest_features_);
+}
+
+/// By the depths of the keyframes that see most of what it sees.
+ImageF PhotorealisticMapper::confirm_depth(const MapSnapshot& map, size_t index) const {
+  const DepthPicture& picture = views_[index].picture;
+  if (picture.depth.empty() || options_.depth.agreement <= 0) return {};
+  const SE3 world_from_view = anchors_from_world_[index].inverse();
+  std::vector<MeasuredView> others;
+  const auto has_depth = [&](KeyframeId other) {
+    return static_cast<size_t>(other.value) < views_.size() &&
+           !views_[static_cast<size_t>(other.value)].picture.depth.empty();
+  };
+  for (const KeyframeId other : confirming_keyframes(map, KeyframeId(static_cast<int32_t>(index)), has_depth)) {
+    const auto i = static_cast<size_t>(other.value);
+    others.push_back({&views_[i].picture, anchors_from_world_[i] * world_from_view});
+  }
+  return confirmed_depth(picture, others, options_.depth.agreement);
 }
 
 void PhotorealisticMapper::sweep_picture(const MapSnapshot& map, size_t index, Executor& executor) {

@@ -173,6 +173,7 @@ class PhotorealisticMapper {
   void rescale(size_t view, double factor);
   void seed_keyframe(const MapSnapshot& map, size_t view, Executor& executor);
   void sweep_picture(const MapSnapshot& map, size_t view, Executor& executor);
+  ImageF confirm_depth(const MapSnapshot& map, size_t view) const;
   void show(size_t view, Executor& executor);
   /// Of the view that show() has just drawn, which is drawn again where one went.
   void settle_guesses_in(size_t view, Executor& executor);

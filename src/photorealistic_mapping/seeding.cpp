@@ -179,6 +179,16 @@ splatting::Gaussian make_disc(const SeedingOptions& options, const Vec3& mean, c
   return gaussian;
 }
 
+/// Whether the map draws the cell's surface behind where two pictures saw it.
+bool is_too_far(const SeedingOptions& options, const ImageF& confirmed, const Cell& cell) {
+  if (confirmed.empty() || !(cell.depth < (1 - options.min_depth_error) * cell.drawn_depth)) return false;
+  int count = 0;
+  for (int y = cell.y0; y < cell.y1; ++y) {
+    for (int x = cell.x0; x < cell.x1; ++x) count += confirmed(x, y) > 0;
+  }
+  return 2 * count > (cell.x1 - cell.x0) * (cell.y1 - cell.y0);
+}
+
 }  // namespace
 
 void SeedingOptions::visit(OptionVisitor& v) {
@@ -199,6 +209,9 @@ void SeedingOptions::visit(OptionVisitor& v) {
           min_transmittance);
   v.value({"min_color_error", "", 0.0, 3.0, "… and those whose mean colour is off by more (squared, all channels)."},
           min_color_error);
+  v.value({"min_depth_error", "", 0.0, 1.0,
+           "… and those whose surface two pictures saw nearer than it is drawn, by more than this share."},
+          min_depth_error);
   v.value({"feature_sigma_px", "px", 0.3, 20.0, "Standard deviation of a gaussian at an inactive feature."},
           feature_sigma_px);
   v.value({"feature_color_error", "", 0.0, 3.0,
@@ -220,7 +233,8 @@ CellSeeds seed_cells(const SeedingOptions& options, const DepthPicture& view, co
       if (!(cell.depth > 0) || !cell.has_data) continue;
       const bool uncovered = cell.transmittance > options.min_transmittance;
       const bool wrong_color = cell.color_error > round.min_color_error;
-      if (!uncovered && !(cell.measured && wrong_color)) continue;
+      const bool wrong = cell.measured && (wrong_color || is_too_far(options, round.confirmed, cell));
+      if (!uncovered && !wrong) continue;
       const double sigma = options.sigma_cells * round.cell * cell.depth / view.camera.fx;
       (cell.measured ? seeds.measured : seeds.guessed)
           .push_back(make_disc(options, view.camera.unproject(cell.center(), cell.depth),

@@ -24,6 +24,7 @@ struct SeedingOptions {
   double opacity = 0.5;
   double min_transmittance = 0.5;
   double min_color_error = 0.10;
+  double min_depth_error = 0.10;
   double feature_sigma_px = 2.0;
   double feature_color_error = 0.05;
   void visit(OptionVisitor& visitor);
@@ -36,6 +37,8 @@ struct SeedingRound {
   /// In a picture without depth the holes of the map take the depth that is drawn around them. Not for what a new
   /// keyframe sees first, nor where a measurement was wanted and failed: what is open there is no hole.
   bool fills_holes = false;
+  /// Depths of the picture that another picture agrees with [H, W], 0 elsewhere; empty: nobody was asked.
+  ImageF confirmed = {};
 };
 
 /// What cells have become.
@@ -48,7 +51,8 @@ struct CellSeeds {
 ///
 /// A cell of the image becomes one gaussian, a disc on the measured surface as large as its cell, where `render` (of
 /// the present map, same camera) does not explain it: mostly transparent, or of another colour. A measurement before
-/// what is drawn is no reason: where it looks right, it is more often the measurement that is wrong.
+/// what is drawn is a reason only where another picture confirms it: else, where the map looks right, it is more often
+/// the measurement that is wrong.
 /// Cells without depth take the nearest measured one, of several the farthest, and only where the map is transparent.
 /// Cells without data in three quarters of their pixels are left out.
 CellSeeds seed_cells(const SeedingOptions& options, const DepthPicture& view, const splatting::RenderResult& render,

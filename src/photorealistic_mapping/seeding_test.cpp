@@ -127,6 +127,28 @@ TEST(SeedCells, WhatTheMapExplainsIsNotSeeded) {
   EXPECT_NEAR(seeds[0].mean[2], 2.0, 1e-6);
 }
 
+TEST(SeedCells, WhatTwoPicturesSawBeforeWhatIsDrawnIsSeeded) {
+  const SeedingOptions options;
+  Scene scene(2.0);
+  scene.render_exactly();
+  // Three blocks before the surface that is drawn, that look like it: the first is confirmed, the second in a quarter
+  // of its pixels, the third not far enough from it.
+  ImageF confirmed(64, 48);
+  for (int y = 8; y < 12; ++y) {
+    for (int x = 8; x < 12; ++x) {
+      confirmed(x, y) = scene.view.depth(x, y) = 1.5f;
+      scene.view.depth(x + 16, y) = 1.5f;
+      if (y == 8) confirmed(x + 16, y) = 1.5f;
+      confirmed(x + 32, y) = scene.view.depth(x + 32, y) = 1.9f;
+    }
+  }
+  const SeedingRound round{kCell, options.min_color_error, false, confirmed};
+  const auto seeds = seed_cells(options, scene.view, scene.render, round).measured;
+  ASSERT_EQ(seeds.size(), 1u);
+  EXPECT_NEAR(seeds[0].mean[2], 1.5, 1e-6);
+  EXPECT_NEAR(seeds[0].mean[0], (9.5 - 31) / 60 * 1.5, 1e-6);
+}
+
 TEST(UnexplainedShare, CountsCellsWithDataThatLookWrong) {
   const SeedingOptions options;
   Scene scene(2.0);
