@@ -511,6 +511,9 @@ class RunTest(CommandLineTest):
         views = photoslam("render", self.folder / "trained", "--orbit", "--orbit-frames", "2", "--output", self.output)
         self.assertEqual(views.returncode, 0, views.stderr)
         self.assertEqual(len(list(self.output.glob("*.png"))), 2)
+        poses = (self.folder / "trained" / "keyframes.tum").read_text(encoding="utf-8").splitlines()
+        images = json.loads((self.folder / "transforms" / "transforms.json").read_text(encoding="utf-8"))["frames"]
+        self.assertEqual(len([line for line in poses if not line.startswith("#")]), len(images))
         # The same pictures of a lens that bends: they are resampled, and less of them counts.
         transforms = self.folder / "transforms" / "transforms.json"
         cameras = json.loads(transforms.read_text(encoding="utf-8"))

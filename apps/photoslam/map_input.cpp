@@ -46,25 +46,27 @@ Result<PinholeCamera> MapInput::camera() const {
     if (!description) return description.error();
     return description->camera;
   }
-  if (fs::exists(path_ / kCameraFile)) {  // of `train`
-    const auto file = read_camera_yaml(path_ / kCameraFile);
+  if (fs::exists(session_in(path_))) {
+    const auto session = read_session(path_);
+    if (!session) return session.error();
+    return session_header(*session).sensor.camera;
+  }
+  if (fs::exists(path_ / kMapCameraFile)) {
+    const auto file = read_camera_yaml(path_ / kMapCameraFile);
     if (!file) return file.error();
     return file->camera;
   }
-  if (!fs::exists(session_in(path_))) {
-    return error("{}: neither the folder of a run nor a session: --trajectory and --orbit need --camera camera.yaml",
-                 path_.string());
-  }
-  const auto session = read_session(path_);
-  if (!session) return session.error();
-  return session_header(*session).sensor.camera;
+  return error(
+      "{}: neither the folder of a run or of `train` nor a session: --trajectory and --orbit need --camera camera.yaml",
+      path_.string());
 }
 
 Result<Trajectory> MapInput::keyframes() const {
   if (session_) return session_->keyframes;
-  const bool is_whole_run = fs::exists(path_ / "run.json") || fs::exists(path_ / kCameraFile);
-  if (is_whole_run && fs::exists(path_ / "keyframes.tum")) return read_tum_trajectory(path_ / "keyframes.tum");
-  if (!fs::exists(session_in(path_))) return Trajectory{};
+  const bool has_session = fs::exists(session_in(path_));
+  const bool of_one_walk = fs::exists(path_ / "run.json") || (!has_session && fs::exists(path_ / kMapCameraFile));
+  if (of_one_walk && fs::exists(path_ / "keyframes.tum")) return read_tum_trajectory(path_ / "keyframes.tum");
+  if (!has_session) return Trajectory{};
   auto view = view_session(path_);  // of a merge: by time the keyframes of two walks would be mixed
   if (!view) return view.error();
   return std::move(view->keyframes);

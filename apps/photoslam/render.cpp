@@ -113,7 +113,7 @@ void add_render(CommandLine& line) {
                "  photoslam render output/desk --trajectory output/desk/trajectory.tum --output frames\n"
                "  photoslam render map.ply --cameras transforms.json --format npy --output views\n");
   RenderArguments& a = *arguments;
-  command.add_option("map", a.map, "map.ply, session.photoslam, or the output folder of a run")->required();
+  command.add_option("map", a.map, "map.ply, session.photoslam, or the output folder of a run or of train")->required();
   command.add_option("--cameras", a.cameras, "Cameras to draw from: transforms.json; distortion is left out");
   command.add_option("--trajectory", a.trajectory, "Poses to draw from: TUM lines");
   command.add_option("--camera", a.camera,

@@ -14,7 +14,7 @@
 namespace photoslam {
 
 inline constexpr const char* kExposuresFile = "exposures.txt";
-inline constexpr const char* kCameraFile = "camera.yaml";  // of the map of `train`
+inline constexpr const char* kMapCameraFile = "map_camera.yaml";  // of the map of `train`
 
 /// Where a run's input came from and with what camera its map is rendered: run.json in the run's folder. Paths of files
 /// are absolute there; a live camera keeps the name it was given.

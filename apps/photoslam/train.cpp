@@ -191,16 +191,20 @@ Trajectory trained_poses(const TrainArguments& arguments, const PosedImages& inp
   return result;
 }
 
-/// map.ply, what `render` wants to know beside it and, for the keyframes of a run, exposures.txt; returns the number of
-/// gaussians.
+/// What `render` wants to know beside map.ply. In the folder of a run it is there, and stays.
+Status describe_map(const TrainArguments& arguments, const PosedImages& input, const FrozenMap& map) {
+  if (fs::exists(arguments.output / "run.json")) return {};
+  const std::string camera = camera_yaml({.camera = input.camera, .distortion = {}});
+  if (Status status = write_file_atomically(arguments.output / kMapCameraFile, camera); !status) return status;
+  return write_tum_trajectory(arguments.output / "keyframes.tum", trained_poses(arguments, input, map));
+}
+
+/// map.ply, its description and, for the keyframes of a run, exposures.txt; returns the number of gaussians.
 Result<size_t> write_map(const TrainArguments& arguments, const PosedImages& input, const FrozenMap& map) {
   const auto written =
       write_gaussian_ply(arguments.output / "map.ply", to_world(map.gaussians, map.anchors_from_world));
   if (!written) return written.error();
-  const std::string camera = camera_yaml({.camera = input.camera, .distortion = {}});
-  if (Status status = write_file_atomically(arguments.output / kCameraFile, camera); !status) return status.error();
-  const Trajectory poses = trained_poses(arguments, input, map);
-  if (Status status = write_tum_trajectory(arguments.output / "keyframes.tum", poses); !status) return status.error();
+  if (Status status = describe_map(arguments, input, map); !status) return status.error();
   if (input.times_ns.empty()) return written->written;
   ExposureTrack track;
   for (size_t i = 0; i < input.times_ns.size(); ++i) {
@@ -281,7 +285,7 @@ void add_train(CommandLine& line) {
   command.add_option("--poses", a.run, "Take images and poses of the keyframes of a run instead");
   command
       .add_option("--output", a.output,
-                  "Folder for map.ply, camera.yaml, keyframes.tum and pairs/ (photo left, render right)")
+                  "Folder for map.ply, what render needs beside it, and pairs/ (photo left, render right)")
       ->capture_default_str();
   command
       .add_option(

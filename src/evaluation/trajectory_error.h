@@ -18,7 +18,8 @@ std::vector<std::pair<size_t, size_t>> associate(const Trajectory& estimate, con
                                                  int64_t max_difference_ns = 20'000'000);
 
 /// Absolute trajectory error after the best alignment of estimate to truth by their positions (Umeyama 1991; Sturm et
-/// al. 2012). Where the path is straight to a hundredth, orientations settle the turn about it for what concerns them.
+/// al. 2012). Where the path is straight to a hundredth, positions leave the turn about it open: for rot_rmse_deg and
+/// truth_from_estimate, not for the distances, orientations settle it.
 struct AbsoluteError {
   double rmse_m = 0;
   double std_m = 0;

@@ -19,9 +19,6 @@ void KeyframeDepthOptions::visit(OptionVisitor& v) {
   v.value({"min_parallax", "", 0.0, 1.0, "Nearer keyframes measure too little: distance over median depth."},
           min_parallax);
   v.value({"max_parallax", "", 0.0, 10.0, "Farther keyframes look too different."}, max_parallax);
-  v.value({"agreement", "", 0.0, 1.0,
-           "A depth is confirmed where another keyframe's differs by at most this share; 0: none is."},
-          agreement);
   v.group("sweep", "The plane sweep.", sweep);
 }
 
@@ -42,6 +39,17 @@ std::optional<DepthRange> search_range(const MapSnapshot& map, const KeyframeVie
   return DepthRange{0.6 * depths[depths.size() / 50], 4.0 * depths[depths.size() - 1 - depths.size() / 50]};
 }
 
+namespace {
+
+/// How far apart two keyframes are, over the median depth of the first.
+double parallax(const MapSnapshot& map, const KeyframeView& view, KeyframeId other) {
+  const SE3 other_from_this =
+      map.keyframe(other).keyframe.camera_from_world * view.keyframe.camera_from_world.inverse();
+  return other_from_this.translation.norm() / std::max(view.median_depth, 1e-9);
+}
+
+}  // namespace
+
 std::vector<KeyframeId> sweep_neighbours(const KeyframeDepthOptions& options, const MapSnapshot& map, KeyframeId id,
                                          const std::function<bool(KeyframeId)>& has_picture) {
   const KeyframeView& view = map.keyframe(id);
@@ -49,20 +57,21 @@ std::vector<KeyframeId> sweep_neighbours(const KeyframeDepthOptions& options, co
   for (const CovisibleKeyframe& candidate : view.covisible) {
     if (static_cast<int>(chosen.size()) >= options.neighbours) break;
     if (!has_picture(candidate.keyframe)) continue;
-    const SE3 other_from_this =
-        map.keyframe(candidate.keyframe).keyframe.camera_from_world * view.keyframe.camera_from_world.inverse();
-    const double parallax = other_from_this.translation.norm() / std::max(view.median_depth, 1e-9);
-    if (parallax >= options.min_parallax && parallax <= options.max_parallax) chosen.push_back(candidate.keyframe);
+    const double apart = parallax(map, view, candidate.keyframe);
+    if (apart >= options.min_parallax && apart <= options.max_parallax) chosen.push_back(candidate.keyframe);
   }
   return chosen;
 }
 
-std::vector<KeyframeId> confirming_keyframes(const MapSnapshot& map, KeyframeId id,
+std::vector<KeyframeId> keyframes_to_compare(const KeyframeDepthOptions& options, const MapSnapshot& map, KeyframeId id,
                                              const std::function<bool(KeyframeId)>& has_depth) {
   constexpr size_t kMost = 4;
+  const KeyframeView& view = map.keyframe(id);
   std::vector<KeyframeId> chosen;
-  for (const CovisibleKeyframe& candidate : map.keyframe(id).covisible) {
-    if (chosen.size() < kMost && has_depth(candidate.keyframe)) chosen.push_back(candidate.keyframe);
+  for (const CovisibleKeyframe& candidate : view.covisible) {
+    if (chosen.size() == kMost) break;
+    if (!has_depth(candidate.keyframe)) continue;
+    if (parallax(map, view, candidate.keyframe) >= options.min_parallax) chosen.push_back(candidate.keyframe);
   }
   return chosen;
 }

@@ -19,7 +19,6 @@ struct KeyframeDepthOptions {
   int neighbours = 2;
   double min_parallax = 0.02;
   double max_parallax = 0.30;
-  double agreement = 0.05;
   DepthSweepOptions sweep;
   void visit(OptionVisitor& visitor);
 };
@@ -28,8 +27,9 @@ struct KeyframeDepthOptions {
 /// median depth; nothing when it has too few of them to tell.
 std::optional<DepthRange> search_range(const MapSnapshot& map, const KeyframeView& view);
 
-/// Covisible keyframes whose depth can confirm this one's, the most covisible first: those that have one.
-std::vector<KeyframeId> confirming_keyframes(const MapSnapshot& map, KeyframeId id,
+/// Covisible keyframes whose depth can be compared with this one's, the most covisible first: those that have one and
+/// are far enough apart not to make the same mistake.
+std::vector<KeyframeId> keyframes_to_compare(const KeyframeDepthOptions& options, const MapSnapshot& map, KeyframeId id,
                                              const std::function<bool(KeyframeId)>& has_depth);
 
 /// Covisible keyframes from whose pictures depth can be swept: seen from the scene's median depth they are far enough

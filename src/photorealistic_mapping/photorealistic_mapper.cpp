@@ -292,18 +292,19 @@ void PhotorealisticMapper::seed_keyframe(const MapSnapshot& map, size_t view, Ex
 /// By the depths of the keyframes that see most of what it sees.
 ImageF PhotorealisticMapper::confirm_depth(const MapSnapshot& map, size_t index) const {
   const DepthPicture& picture = views_[index].picture;
-  if (picture.depth.empty() || options_.depth.agreement <= 0) return {};
+  if (picture.depth.empty() || options_.seeding.consistency_tolerance <= 0) return {};
   const SE3 world_from_view = anchors_from_world_[index].inverse();
   std::vector<MeasuredView> others;
   const auto has_depth = [&](KeyframeId other) {
     return static_cast<size_t>(other.value) < views_.size() &&
            !views_[static_cast<size_t>(other.value)].picture.depth.empty();
   };
-  for (const KeyframeId other : confirming_keyframes(map, KeyframeId(static_cast<int32_t>(index)), has_depth)) {
+  for (const KeyframeId other :
+       keyframes_to_compare(options_.depth, map, KeyframeId(static_cast<int32_t>(index)), has_depth)) {
     const auto i = static_cast<size_t>(other.value);
     others.push_back({&views_[i].picture, anchors_from_world_[i] * world_from_view});
   }
-  return confirmed_depth(picture, others, options_.depth.agreement);
+  return confirmed_depth(picture, others, options_.seeding.consistency_tolerance);
 }
 
 void PhotorealisticMapper::sweep_picture(const MapSnapshot& map, size_t index, Executor& executor) {

@@ -117,6 +117,33 @@ TEST_F(PhotorealisticMapperTest, WhatWasGuessedGoesWhenItIsMeasuredFartherAway) 
   EXPECT_GT(left_half_at(1, 4), 700) << "seeded where they were measured";
 }
 
+TEST_F(PhotorealisticMapperTest, WhatTwoKeyframesMeasureBeforeWhatIsDrawnIsSeeded) {
+  const auto seeds_at = [&](double tolerance, float metres) {
+    PhotorealisticOptions options;
+    options.seeding.consistency_tolerance = tolerance;
+    options.seeding.min_color_error = 3;  // colours are no reason
+    options.seeding.inactive_features = options.seeding.active_features = false;
+    PhotorealisticMapper mapper(options, {.camera = kCamera, .metres_per_depth_unit = 0.001}, 1);
+    world = testing::WallWithKeyframes{kCamera};
+    num_added = 0;
+    // The first keyframe measures wrongly. The second contradicts it, the third agrees with the second.
+    for (const auto& [x, depth] : {std::pair{0.0, 6000}, {0.1, 4000}, {0.2, 4100}}) {
+      add(mapper, at(x), {{}, ImageU16(kCamera.width, kCamera.height, 1, static_cast<uint16_t>(depth)), {}});
+    }
+    std::vector<int> count(3);
+    mapper.gaussians().for_each([&](size_t i) {
+      const bool there = std::abs(mapper.gaussians().get(i).mean[2] - metres) < 0.05f;
+      count[static_cast<size_t>(mapper.gaussians().anchor(i))] += there;
+    });
+    return count;
+  };
+  EXPECT_GT(seeds_at(0.05, 6.0f)[0], 800) << "what is drawn";
+  EXPECT_LT(seeds_at(0.05, 4.0f)[1], 100) << "a strip at the edge that is new";
+  EXPECT_GT(seeds_at(0.05, 4.1f)[2], 800);
+  EXPECT_LT(seeds_at(0.0, 4.1f)[2], 100);
+  EXPECT_LT(seeds_at(0.01, 4.1f)[2], 100);
+}
+
 TEST_F(PhotorealisticMapperTest, ThatGuessesGoChangesNoExposure) {
   PhotorealisticOptions keeps;
   keeps.guess_tolerance = 0;

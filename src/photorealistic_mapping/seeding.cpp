@@ -179,12 +179,18 @@ splatting::Gaussian make_disc(const SeedingOptions& options, const Vec3& mean, c
   return gaussian;
 }
 
-/// Whether the map draws the cell's surface behind where two pictures saw it.
-bool is_too_far(const SeedingOptions& options, const ImageF& confirmed, const Cell& cell) {
-  if (confirmed.empty() || !(cell.depth < (1 - options.min_depth_error) * cell.drawn_depth)) return false;
+/// Whether the map draws most of the cell behind where two pictures saw it. Pixel by pixel: at an edge the mean of what
+/// is drawn lies between two surfaces.
+bool is_too_far(const SeedingOptions& options, const ImageF& confirmed, const splatting::RenderResult& render,
+                const Cell& cell) {
+  if (confirmed.empty()) return false;
+  const auto share = static_cast<float>(1 - options.min_depth_error);
   int count = 0;
   for (int y = cell.y0; y < cell.y1; ++y) {
-    for (int x = cell.x0; x < cell.x1; ++x) count += confirmed(x, y) > 0;
+    for (int x = cell.x0; x < cell.x1; ++x) {
+      const size_t i = static_cast<size_t>(y) * static_cast<size_t>(confirmed.width()) + static_cast<size_t>(x);
+      count += confirmed(x, y) > 0 && confirmed(x, y) * render.alpha[i] < share * render.depth[i];
+    }
   }
   return 2 * count > (cell.x1 - cell.x0) * (cell.y1 - cell.y0);
 }
@@ -212,6 +218,9 @@ void SeedingOptions::visit(OptionVisitor& v) {
   v.value({"min_depth_error", "", 0.0, 1.0,
            "… and those whose surface two pictures saw nearer than it is drawn, by more than this share."},
           min_depth_error);
+  v.value({"consistency_tolerance", "", 0.0, 1.0,
+           "They saw it both when their depths differ by at most this share; 0: depths are not compared."},
+          consistency_tolerance);
   v.value({"feature_sigma_px", "px", 0.3, 20.0, "Standard deviation of a gaussian at an inactive feature."},
           feature_sigma_px);
   v.value({"feature_color_error", "", 0.0, 3.0,
@@ -233,7 +242,7 @@ CellSeeds seed_cells(const SeedingOptions& options, const DepthPicture& view, co
       if (!(cell.depth > 0) || !cell.has_data) continue;
       const bool uncovered = cell.transmittance > options.min_transmittance;
       const bool wrong_color = cell.color_error > round.min_color_error;
-      const bool wrong = cell.measured && (wrong_color || is_too_far(options, round.confirmed, cell));
+      const bool wrong = cell.measured && (wrong_color || is_too_far(options, round.confirmed, render, cell));
       if (!uncovered && !wrong) continue;
       const double sigma = options.sigma_cells * round.cell * cell.depth / view.camera.fx;
       (cell.measured ? seeds.measured : seeds.guessed)

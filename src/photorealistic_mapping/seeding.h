@@ -25,6 +25,7 @@ struct SeedingOptions {
   double min_transmittance = 0.5;
   double min_color_error = 0.10;
   double min_depth_error = 0.10;
+  double consistency_tolerance = 0.05;
   double feature_sigma_px = 2.0;
   double feature_color_error = 0.05;
   void visit(OptionVisitor& visitor);

@@ -142,6 +142,14 @@ TEST(SeedCells, WhatTwoPicturesSawBeforeWhatIsDrawnIsSeeded) {
       confirmed(x + 32, y) = scene.view.depth(x + 32, y) = 1.9f;
     }
   }
+  // A cell with an edge, drawn as it is: its mean depth is neither.
+  for (int y = 8; y < 12; ++y) {
+    for (int x = 56; x < 60; ++x) {
+      const float depth = x < 59 ? 1.0f : 6.0f;
+      confirmed(x, y) = scene.view.depth(x, y) = depth;
+      scene.render.depth[static_cast<size_t>(64 * y + x)] = depth;
+    }
+  }
   const SeedingRound round{kCell, options.min_color_error, false, confirmed};
   const auto seeds = seed_cells(options, scene.view, scene.render, round).measured;
   ASSERT_EQ(seeds.size(), 1u);

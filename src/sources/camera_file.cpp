@@ -63,7 +63,7 @@ std::string camera_yaml(const CameraFile& file) {
       c.fy, c.cx, c.cy, coefficients_text(file.distortion));
   if (file.frames_per_second) text += fmt::format("fps: {}\n", *file.frames_per_second);
   if (file.depth_scale) {
-    text += fmt::format("depth_scale: {:.1f}  # stored value / depth_scale = metres\n", *file.depth_scale);
+    text += fmt::format("depth_scale: {:.12g}  # stored value / depth_scale = metres\n", *file.depth_scale);
   }
   return text;
 }

@@ -46,6 +46,7 @@ TEST_F(CameraFileTest, WhatIsWrittenIsRead) {
   CameraFile fisheye;
   fisheye.camera = {320, 240, 190.125, 190.25, 160.5, 120.75};
   fisheye.distortion = {.k1 = 0.01, .k2 = -0.02, .k3 = 0.003, .k4 = 1e-5, .model = LensModel::kannala_brandt};
+  fisheye.depth_scale = 0.04;
   for (const CameraFile& file : {read_camera_yaml(write("camera.yaml", kComplete)).value(), fisheye}) {
     const CameraFile read = read_camera_yaml(write("written.yaml", camera_yaml(file))).value();
     EXPECT_EQ(read.camera, file.camera);
