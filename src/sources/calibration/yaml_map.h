@@ -40,7 +40,7 @@ class YamlMap {
   Status status() const;
 
  private:
-  YamlMap(YAML::Node root, std::string path) : root_(std::move(root)), path_(std::move(path)) {}
+  YamlMap(const YAML::Node& root, std::string path) : root_(root), path_(std::move(path)) {}
   YAML::Node find(const std::string& key) const;
   void fail(const YAML::Node& node, const std::string& what);
   double number(const YAML::Node& node, const std::string& name, double min, double max);
