@@ -3,6 +3,7 @@
 #include "photorealistic_mapping/keyframe_depth.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace photoslam {
 
@@ -41,39 +42,34 @@ std::optional<DepthRange> search_range(const MapSnapshot& map, const KeyframeVie
 
 namespace {
 
-/// How far apart two keyframes are, over the median depth of the first.
-double parallax(const MapSnapshot& map, const KeyframeView& view, KeyframeId other) {
-  const SE3 other_from_this =
-      map.keyframe(other).keyframe.camera_from_world * view.keyframe.camera_from_world.inverse();
-  return other_from_this.translation.norm() / std::max(view.median_depth, 1e-9);
+/// Covisible keyframes that are usable and at least and at most so far apart from this one, over its median depth.
+std::vector<KeyframeId> most_covisible(const MapSnapshot& map, KeyframeId id, size_t most, double min_parallax,
+                                       double max_parallax, const std::function<bool(KeyframeId)>& is_usable) {
+  const KeyframeView& view = map.keyframe(id);
+  std::vector<KeyframeId> chosen;
+  for (const CovisibleKeyframe& candidate : view.covisible) {
+    if (chosen.size() >= most) break;
+    if (!is_usable(candidate.keyframe)) continue;
+    const SE3 other_from_this =
+        map.keyframe(candidate.keyframe).keyframe.camera_from_world * view.keyframe.camera_from_world.inverse();
+    const double parallax = other_from_this.translation.norm() / std::max(view.median_depth, 1e-9);
+    if (parallax >= min_parallax && parallax <= max_parallax) chosen.push_back(candidate.keyframe);
+  }
+  return chosen;
 }
 
 }  // namespace
 
 std::vector<KeyframeId> sweep_neighbours(const KeyframeDepthOptions& options, const MapSnapshot& map, KeyframeId id,
                                          const std::function<bool(KeyframeId)>& has_picture) {
-  const KeyframeView& view = map.keyframe(id);
-  std::vector<KeyframeId> chosen;
-  for (const CovisibleKeyframe& candidate : view.covisible) {
-    if (static_cast<int>(chosen.size()) >= options.neighbours) break;
-    if (!has_picture(candidate.keyframe)) continue;
-    const double apart = parallax(map, view, candidate.keyframe);
-    if (apart >= options.min_parallax && apart <= options.max_parallax) chosen.push_back(candidate.keyframe);
-  }
-  return chosen;
+  return most_covisible(map, id, static_cast<size_t>(options.neighbours), options.min_parallax, options.max_parallax,
+                        has_picture);
 }
 
 std::vector<KeyframeId> keyframes_to_compare(const KeyframeDepthOptions& options, const MapSnapshot& map, KeyframeId id,
                                              const std::function<bool(KeyframeId)>& has_depth) {
   constexpr size_t kMost = 4;
-  const KeyframeView& view = map.keyframe(id);
-  std::vector<KeyframeId> chosen;
-  for (const CovisibleKeyframe& candidate : view.covisible) {
-    if (chosen.size() == kMost) break;
-    if (!has_depth(candidate.keyframe)) continue;
-    if (parallax(map, view, candidate.keyframe) >= options.min_parallax) chosen.push_back(candidate.keyframe);
-  }
-  return chosen;
+  return most_covisible(map, id, kMost, options.min_parallax, std::numeric_limits<double>::infinity(), has_depth);
 }
 
 }  // namespace photoslam
