@@ -181,8 +181,8 @@ splatting::Gaussian make_disc(const SeedingOptions& options, const Vec3& mean, c
 
 /// Whether the map draws most of the cell behind where two pictures saw it. Pixel by pixel: at an edge the mean of what
 /// is drawn lies between two surfaces.
-bool is_too_far(const SeedingOptions& options, const ImageF& confirmed, const splatting::RenderResult& render,
-                const Cell& cell) {
+bool is_drawn_too_far(const SeedingOptions& options, const ImageF& confirmed, const splatting::RenderResult& render,
+                      const Cell& cell) {
   if (confirmed.empty()) return false;
   const auto share = static_cast<float>(1 - options.min_depth_error);
   int count = 0;
@@ -242,7 +242,7 @@ CellSeeds seed_cells(const SeedingOptions& options, const DepthPicture& view, co
       if (!(cell.depth > 0) || !cell.has_data) continue;
       const bool uncovered = cell.transmittance > options.min_transmittance;
       const bool wrong_color = cell.color_error > round.min_color_error;
-      const bool wrong = cell.measured && (wrong_color || is_too_far(options, round.confirmed, render, cell));
+      const bool wrong = cell.measured && (wrong_color || is_drawn_too_far(options, round.confirmed, render, cell));
       if (!uncovered && !wrong) continue;
       const double sigma = options.sigma_cells * round.cell * cell.depth / view.camera.fx;
       (cell.measured ? seeds.measured : seeds.guessed)
